@@ -1,0 +1,1 @@
+//! Workloads, histograms, reports.

@@ -1,0 +1,1 @@
+//! The process shell: iceoryx2, clocks, cores.

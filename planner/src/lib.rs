@@ -1,0 +1,1 @@
+//! The thinking: constraints, priorities, selection, path search.

@@ -1,0 +1,1 @@
+//! One robot's step machine.

@@ -1,0 +1,1 @@
+//! The domain: geometry, scenario files, configuration space, generators.

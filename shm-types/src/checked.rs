@@ -1,0 +1,292 @@
+//! Validation of what comes out of shared memory, once and in place.
+//!
+//! The pure crates accept nothing but [`Checked`] values, so no code past this file needs to
+//! distrust a count, an id or a tag.
+
+use std::ops::Deref;
+
+use crate::capacity::{LAYOUT_VERSION, MAGIC, MAX_CONSTRAINTS, MAX_EVENTS, MAX_MOTIONS, MAX_OBJECTS, MAX_PATH_POINTS, MAX_ROBOTS};
+use crate::{
+    Activity, BodyKind, Command, ConstraintKind, ConstraintTable, ControlKind, ControlRequest,
+    EventKind, FailureCause, Grip, HardAnswer, HardRequest, MotionBatch, NONE, Outcome, Phase,
+    PlannerReport, Point, RoleKind, TaskStatus, WorldSnapshot,
+};
+
+/// Why a message was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Invalid {
+    /// An integer that stands for no value of its type.
+    #[error("{code} is no {what}")]
+    Tag {
+        /// Name of the type.
+        what: &'static str,
+        /// What was found.
+        code: u32,
+    },
+    /// A count over its capacity.
+    #[error("{what} is {count}, over the capacity of {capacity}")]
+    Count {
+        /// Which count.
+        what: &'static str,
+        /// What was found.
+        count: u32,
+        /// The most there can be.
+        capacity: usize,
+    },
+    /// An id out of range.
+    #[error("{what} is {id}, but there are only {count}")]
+    Id {
+        /// Which id.
+        what: &'static str,
+        /// What was found.
+        id: u32,
+        /// Ids below this are in range.
+        count: u32,
+    },
+    /// A number that is not finite.
+    #[error("{what} is not finite")]
+    NotFinite {
+        /// Which number.
+        what: &'static str,
+    },
+    /// A message of some other program, or of another version of this one.
+    #[error("not a message of this program and version")]
+    Foreign,
+    /// A field that has only one legal value, or an ordering that does not hold.
+    #[error("{what} contradicts the rest of the message")]
+    Inconsistent {
+        /// Which field.
+        what: &'static str,
+    },
+}
+
+/// How many robots and objects a run has: what ids are checked against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Counts {
+    /// Robots.
+    pub robots: u32,
+    /// Objects, and so tasks.
+    pub objects: u32,
+}
+
+/// A message that can be checked before use.
+pub trait Validate {
+    /// Checks every live value.
+    ///
+    /// # Errors
+    /// The first value that is out of range.
+    fn validate(&self, counts: Counts) -> Result<(), Invalid>;
+}
+
+/// A message whose every live value has been checked. Borrowed: checking copies nothing.
+pub struct Checked<'a, T>(&'a T);
+
+impl<T> Clone for Checked<'_, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for Checked<'_, T> {}
+
+impl<T> Deref for Checked<'_, T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        self.0
+    }
+}
+
+impl<'a, T: Validate> Checked<'a, T> {
+    /// Checks `message` against the run's counts.
+    ///
+    /// # Errors
+    /// The first value that is out of range.
+    pub fn new(message: &'a T, counts: Counts) -> Result<Self, Invalid> {
+        message.validate(counts)?;
+        Ok(Self(message))
+    }
+}
+
+impl<'a, T> Checked<'a, T> {
+    /// The message, for as long as the sample it lies in.
+    #[must_use]
+    pub const fn get(self) -> &'a T {
+        self.0
+    }
+}
+
+impl Checked<'_, WorldSnapshot> {
+    /// The live robots.
+    #[must_use]
+    pub fn robots(&self) -> &[crate::RobotState] {
+        &self.0.robots[..self.0.header.robot_count as usize]
+    }
+
+    /// The live objects.
+    #[must_use]
+    pub fn objects(&self) -> &[crate::ObjectState] {
+        &self.0.objects[..self.0.header.object_count as usize]
+    }
+}
+
+fn count(what: &'static str, count: u32, capacity: usize) -> Result<(), Invalid> {
+    if count as usize > capacity { Err(Invalid::Count { what, count, capacity }) } else { Ok(()) }
+}
+
+fn id(what: &'static str, id: u32, count: u32) -> Result<(), Invalid> {
+    if id < count { Ok(()) } else { Err(Invalid::Id { what, id, count }) }
+}
+
+fn id_or_none(what: &'static str, value: u32, count: u32) -> Result<(), Invalid> {
+    if value == NONE { Ok(()) } else { id(what, value, count) }
+}
+
+fn finite(what: &'static str, point: Point) -> Result<(), Invalid> {
+    if point.is_finite() { Ok(()) } else { Err(Invalid::NotFinite { what }) }
+}
+
+fn flag(what: &'static str, code: u32) -> Result<(), Invalid> {
+    if code <= 1 { Ok(()) } else { Err(Invalid::Tag { what, code }) }
+}
+
+impl Validate for WorldSnapshot {
+    fn validate(&self, counts: Counts) -> Result<(), Invalid> {
+        let header = &self.header;
+        if header.magic != MAGIC || header.layout_version != LAYOUT_VERSION {
+            return Err(Invalid::Foreign);
+        }
+        count("robot_count", header.robot_count, MAX_ROBOTS)?;
+        count("object_count", header.object_count, MAX_OBJECTS)?;
+        if header.robot_count != counts.robots || header.object_count != counts.objects {
+            return Err(Invalid::Inconsistent { what: "the number of robots or objects" });
+        }
+        Outcome::decode(header.outcome)?;
+        flag("held", header.held)?;
+        for robot in &self.robots[..header.robot_count as usize] {
+            finite("a robot's position", robot.position)?;
+            finite("a robot's position at the epoch", robot.epoch_position)?;
+            id_or_none("a robot's task", robot.task, counts.objects)?;
+            id_or_none("a held object", robot.holding, counts.objects)?;
+            Phase::decode(robot.phase)?;
+            Activity::decode(robot.activity)?;
+            flag("epoch_free", robot.epoch_free)?;
+            flag("live", robot.live)?;
+            flag("request_open", robot.request_open)?;
+            count("grant_count", robot.grant_count, MAX_PATH_POINTS)?;
+            for point in robot.grant() {
+                finite("a granted point", *point)?;
+            }
+        }
+        for object in &self.objects[..header.object_count as usize] {
+            finite("an object's position", object.position)?;
+            finite("an object's place of rest", object.rest)?;
+            flag("has_goal", object.has_goal)?;
+            if object.has_goal == 1 {
+                finite("a goal", object.goal)?;
+            }
+            id_or_none("a holder", object.holder, counts.robots)?;
+            id_or_none("a claimant", object.claimed_by, counts.robots)?;
+            TaskStatus::decode(object.status)?;
+            TaskStatus::decode(object.epoch_status)?;
+        }
+        Ok(())
+    }
+}
+
+impl Validate for Command {
+    fn validate(&self, counts: Counts) -> Result<(), Invalid> {
+        id("robot", self.robot, counts.robots)?;
+        Phase::decode(self.phase)?;
+        Activity::decode(self.activity)?;
+        Grip::decode(self.grip)?;
+        flag("go", self.go)?;
+        id_or_none("a claimed task", self.claim.task, counts.objects)?;
+        FailureCause::decode(self.failure.cause)?;
+        id_or_none("a failed task", self.failure.task, counts.objects)?;
+        id_or_none("a blocking robot", self.failure.blocker, counts.robots)?;
+        flag("answered", self.failure.answered)?;
+        if self.valid_until_tick < self.tick {
+            return Err(Invalid::Inconsistent { what: "valid_until_tick" });
+        }
+        count("points asked for", self.path.count, MAX_PATH_POINTS)?;
+        for point in self.path.points() {
+            finite("a point asked for", *point)?;
+        }
+        Ok(())
+    }
+}
+
+impl Validate for ConstraintTable {
+    fn validate(&self, counts: Counts) -> Result<(), Invalid> {
+        count("constraints", self.count, MAX_CONSTRAINTS)?;
+        for constraint in self.constraints() {
+            id("a task", constraint.before, counts.objects)?;
+            id("a task", constraint.after, counts.objects)?;
+            ConstraintKind::decode(constraint.kind)?;
+            if constraint.before == constraint.after {
+                return Err(Invalid::Inconsistent { what: "a constraint of a task on itself" });
+            }
+        }
+        if !self.constraints().is_sorted_by(|a, b| a < b) {
+            return Err(Invalid::Inconsistent { what: "the order of the constraints" });
+        }
+        Ok(())
+    }
+}
+
+impl Validate for HardRequest {
+    fn validate(&self, counts: Counts) -> Result<(), Invalid> {
+        id("robot", self.robot, counts.robots)?;
+        id("task", self.task, counts.objects)
+    }
+}
+
+impl Validate for HardAnswer {
+    fn validate(&self, counts: Counts) -> Result<(), Invalid> {
+        id("robot", self.robot, counts.robots)?;
+        id("task", self.task, counts.objects)?;
+        flag("infeasible", self.infeasible)
+    }
+}
+
+impl Validate for PlannerReport {
+    fn validate(&self, _counts: Counts) -> Result<(), Invalid> {
+        flag("busy", self.busy)
+    }
+}
+
+impl Validate for ControlRequest {
+    fn validate(&self, counts: Counts) -> Result<(), Invalid> {
+        ControlKind::decode(self.kind)?;
+        if RoleKind::decode(self.role)? == RoleKind::Robot {
+            id("robot", self.index, counts.robots)?;
+        }
+        Ok(())
+    }
+}
+
+impl Validate for MotionBatch {
+    fn validate(&self, counts: Counts) -> Result<(), Invalid> {
+        count("motions", self.motion_count, MAX_MOTIONS)?;
+        count("events", self.event_count, MAX_EVENTS)?;
+        for motion in self.motions() {
+            let bodies = match BodyKind::decode(motion.body)? {
+                BodyKind::Robot => counts.robots,
+                BodyKind::Object => counts.objects,
+            };
+            id("a moving body", motion.id, bodies)?;
+            finite("a place of motion", motion.from)?;
+            finite("a place of motion", motion.to)?;
+            if motion.end_ns <= motion.start_ns {
+                return Err(Invalid::Inconsistent { what: "the end of a motion" });
+            }
+        }
+        for event in self.events() {
+            EventKind::decode(event.kind)?;
+            id_or_none("an event's robot", event.robot, counts.robots)?;
+            id_or_none("an event's task", event.task, counts.objects)?;
+        }
+        Ok(())
+    }
+}

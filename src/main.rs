@@ -1,0 +1,2 @@
+//! The `rearrange` binary.
+fn main() {}

@@ -1,0 +1,1 @@
+//! MCAP traces and the independent checker.
