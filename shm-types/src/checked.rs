@@ -5,7 +5,10 @@
 
 use std::ops::Deref;
 
-use crate::capacity::{LAYOUT_VERSION, MAGIC, MAX_CONSTRAINTS, MAX_EVENTS, MAX_MOTIONS, MAX_OBJECTS, MAX_PATH_POINTS, MAX_ROBOTS};
+use crate::capacity::{
+    LAYOUT_VERSION, MAGIC, MAX_CONSTRAINTS, MAX_EVENTS, MAX_MOTIONS, MAX_OBJECTS, MAX_PATH_POINTS,
+    MAX_ROBOTS,
+};
 use crate::{
     Activity, BodyKind, Command, ConstraintKind, ConstraintTable, ControlKind, ControlRequest,
     EventKind, FailureCause, Grip, HardAnswer, HardRequest, MotionBatch, NONE, Outcome, Phase,
@@ -131,23 +134,47 @@ impl Checked<'_, WorldSnapshot> {
 }
 
 fn count(what: &'static str, count: u32, capacity: usize) -> Result<(), Invalid> {
-    if count as usize > capacity { Err(Invalid::Count { what, count, capacity }) } else { Ok(()) }
+    if count as usize > capacity {
+        Err(Invalid::Count {
+            what,
+            count,
+            capacity,
+        })
+    } else {
+        Ok(())
+    }
 }
 
 fn id(what: &'static str, id: u32, count: u32) -> Result<(), Invalid> {
-    if id < count { Ok(()) } else { Err(Invalid::Id { what, id, count }) }
+    if id < count {
+        Ok(())
+    } else {
+        Err(Invalid::Id { what, id, count })
+    }
 }
 
 fn id_or_none(what: &'static str, value: u32, count: u32) -> Result<(), Invalid> {
-    if value == NONE { Ok(()) } else { id(what, value, count) }
+    if value == NONE {
+        Ok(())
+    } else {
+        id(what, value, count)
+    }
 }
 
 fn finite(what: &'static str, point: Point) -> Result<(), Invalid> {
-    if point.is_finite() { Ok(()) } else { Err(Invalid::NotFinite { what }) }
+    if point.is_finite() {
+        Ok(())
+    } else {
+        Err(Invalid::NotFinite { what })
+    }
 }
 
 fn flag(what: &'static str, code: u32) -> Result<(), Invalid> {
-    if code <= 1 { Ok(()) } else { Err(Invalid::Tag { what, code }) }
+    if code <= 1 {
+        Ok(())
+    } else {
+        Err(Invalid::Tag { what, code })
+    }
 }
 
 impl Validate for WorldSnapshot {
@@ -159,7 +186,9 @@ impl Validate for WorldSnapshot {
         count("robot_count", header.robot_count, MAX_ROBOTS)?;
         count("object_count", header.object_count, MAX_OBJECTS)?;
         if header.robot_count != counts.robots || header.object_count != counts.objects {
-            return Err(Invalid::Inconsistent { what: "the number of robots or objects" });
+            return Err(Invalid::Inconsistent {
+                what: "the number of robots or objects",
+            });
         }
         Outcome::decode(header.outcome)?;
         flag("held", header.held)?;
@@ -207,7 +236,9 @@ impl Validate for Command {
         id_or_none("a blocking robot", self.failure.blocker, counts.robots)?;
         flag("answered", self.failure.answered)?;
         if self.valid_until_tick < self.tick {
-            return Err(Invalid::Inconsistent { what: "valid_until_tick" });
+            return Err(Invalid::Inconsistent {
+                what: "valid_until_tick",
+            });
         }
         count("points asked for", self.path.count, MAX_PATH_POINTS)?;
         for point in self.path.points() {
@@ -225,11 +256,15 @@ impl Validate for ConstraintTable {
             id("a task", constraint.after, counts.objects)?;
             ConstraintKind::decode(constraint.kind)?;
             if constraint.before == constraint.after {
-                return Err(Invalid::Inconsistent { what: "a constraint of a task on itself" });
+                return Err(Invalid::Inconsistent {
+                    what: "a constraint of a task on itself",
+                });
             }
         }
         if !self.constraints().is_sorted_by(|a, b| a < b) {
-            return Err(Invalid::Inconsistent { what: "the order of the constraints" });
+            return Err(Invalid::Inconsistent {
+                what: "the order of the constraints",
+            });
         }
         Ok(())
     }
@@ -279,7 +314,9 @@ impl Validate for MotionBatch {
             finite("a place of motion", motion.from)?;
             finite("a place of motion", motion.to)?;
             if motion.end_ns <= motion.start_ns {
-                return Err(Invalid::Inconsistent { what: "the end of a motion" });
+                return Err(Invalid::Inconsistent {
+                    what: "the end of a motion",
+                });
             }
         }
         for event in self.events() {

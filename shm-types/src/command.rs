@@ -53,7 +53,9 @@ pub struct Failure {
 }
 
 /// Work done so far, by one participant.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, FromBytes, IntoBytes, Immutable, KnownLayout)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, FromBytes, IntoBytes, Immutable, KnownLayout,
+)]
 #[repr(C)]
 pub struct Counters {
     /// Polygon tests charged (rule 23).
@@ -109,7 +111,11 @@ pub struct Command {
 
 impl Claim {
     /// No claim.
-    pub const NONE: Self = Self { task: NONE, constraints_version: 0, epoch: 0 };
+    pub const NONE: Self = Self {
+        task: NONE,
+        constraints_version: 0,
+        epoch: 0,
+    };
 }
 
 impl PathRequest {
@@ -128,7 +134,11 @@ impl Default for PathRequest {
 
 impl Default for Failure {
     fn default() -> Self {
-        Self { task: NONE, blocker: NONE, ..zerocopy::FromZeros::new_zeroed() }
+        Self {
+            task: NONE,
+            blocker: NONE,
+            ..zerocopy::FromZeros::new_zeroed()
+        }
     }
 }
 

@@ -31,7 +31,9 @@ pub use control::{ControlKind, ControlReply, ControlRequest, RoleKind};
 pub use hash::StateHash;
 pub use id::{NONE, index};
 pub use motion::{BodyKind, EventKind, EventRecord, MotionBatch, MotionRecord};
-pub use planner::{Constraint, ConstraintKind, ConstraintTable, HardAnswer, HardRequest, PlannerReport};
+pub use planner::{
+    Constraint, ConstraintKind, ConstraintTable, HardAnswer, HardRequest, PlannerReport,
+};
 pub use point::Point;
 pub use snapshot::{
     Activity, FailureCause, Grip, ObjectState, Outcome, Phase, RobotState, SnapshotHeader,
@@ -43,7 +45,10 @@ pub use snapshot::{
 /// # Panics
 /// When memory is exhausted.
 #[must_use]
-#[expect(clippy::expect_used, reason = "an allocator that is out of memory aborts anyway")]
+#[expect(
+    clippy::expect_used,
+    reason = "an allocator that is out of memory aborts anyway"
+)]
 pub fn zeroed<T: zerocopy::FromZeros>() -> Box<T> {
     T::new_box_zeroed().expect("out of memory")
 }

@@ -121,7 +121,14 @@ impl EventRecord {
     /// An event of `kind` at `time_ns` that names nobody.
     #[must_use]
     pub const fn new(kind: EventKind, time_ns: u64) -> Self {
-        Self { time_ns, value: 0, kind: kind.code(), robot: NONE, task: NONE, other: NONE }
+        Self {
+            time_ns,
+            value: 0,
+            kind: kind.code(),
+            robot: NONE,
+            task: NONE,
+            other: NONE,
+        }
     }
 }
 

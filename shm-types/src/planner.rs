@@ -17,7 +17,9 @@ tag! {
 }
 
 /// A hard constraint: task `before` must be completed before task `after` is selected (rule 13).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, FromBytes, IntoBytes, Immutable, KnownLayout)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, FromBytes, IntoBytes, Immutable, KnownLayout,
+)]
 #[repr(C)]
 pub struct Constraint {
     /// Task that goes first.

@@ -2,7 +2,9 @@
 
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-use crate::capacity::{LAYOUT_VERSION, MAGIC, MAX_OBJECTS, MAX_PATH_POINTS, MAX_ROBOTS, ROBOT_WORDS};
+use crate::capacity::{
+    LAYOUT_VERSION, MAGIC, MAX_OBJECTS, MAX_PATH_POINTS, MAX_ROBOTS, ROBOT_WORDS,
+};
 use crate::id::tag;
 use crate::{NONE, Point, StateHash};
 
@@ -232,25 +234,41 @@ pub struct WorldSnapshot {
 impl SnapshotHeader {
     /// Adds all that is state: everything but the transport's stamp and the hash itself.
     pub fn hash_into(&self, hash: &mut StateHash) {
-        hash.add(&Self { publish_stamp_ns: 0, state_hash: 0, ..*self });
+        hash.add(&Self {
+            publish_stamp_ns: 0,
+            state_hash: 0,
+            ..*self
+        });
     }
 }
 
 impl Default for SnapshotHeader {
     fn default() -> Self {
-        Self { magic: MAGIC, layout_version: LAYOUT_VERSION, ..zerocopy::FromZeros::new_zeroed() }
+        Self {
+            magic: MAGIC,
+            layout_version: LAYOUT_VERSION,
+            ..zerocopy::FromZeros::new_zeroed()
+        }
     }
 }
 
 impl Default for RobotState {
     fn default() -> Self {
-        Self { task: NONE, holding: NONE, ..zerocopy::FromZeros::new_zeroed() }
+        Self {
+            task: NONE,
+            holding: NONE,
+            ..zerocopy::FromZeros::new_zeroed()
+        }
     }
 }
 
 impl Default for ObjectState {
     fn default() -> Self {
-        Self { holder: NONE, claimed_by: NONE, ..zerocopy::FromZeros::new_zeroed() }
+        Self {
+            holder: NONE,
+            claimed_by: NONE,
+            ..zerocopy::FromZeros::new_zeroed()
+        }
     }
 }
 

@@ -1,0 +1,222 @@
+//! Messages as bytes: every live byte is state, and no byte string can make validation panic.
+
+use std::mem::offset_of;
+
+use proptest::prelude::*;
+use shm_types::{
+    Checked, Command, ConstraintTable, Counts, Invalid, MotionBatch, NONE, ObjectState, RobotState,
+    SnapshotHeader, StateHash, Validate, WorldSnapshot, zeroed,
+};
+use zerocopy::{FromBytes, IntoBytes};
+
+const COUNTS: Counts = Counts {
+    robots: 2,
+    objects: 3,
+};
+
+fn snapshot() -> Box<WorldSnapshot> {
+    let mut snapshot: Box<WorldSnapshot> = zeroed();
+    snapshot.header = SnapshotHeader {
+        robot_count: COUNTS.robots,
+        object_count: COUNTS.objects,
+        ..SnapshotHeader::default()
+    };
+    snapshot.robots.fill(RobotState::default());
+    snapshot.objects.fill(ObjectState::default());
+    snapshot
+}
+
+fn hash(snapshot: &WorldSnapshot) -> u64 {
+    let mut hash = StateHash::new();
+    snapshot.hash_into(&mut hash);
+    hash.finish()
+}
+
+/// Byte ranges of the live part of a snapshot with `COUNTS`.
+fn live_bytes() -> impl Iterator<Item = usize> {
+    let robots = offset_of!(WorldSnapshot, robots);
+    let objects = offset_of!(WorldSnapshot, objects);
+    (0..size_of::<SnapshotHeader>())
+        .chain(robots..robots + COUNTS.robots as usize * size_of::<RobotState>())
+        .chain(objects..objects + COUNTS.objects as usize * size_of::<ObjectState>())
+}
+
+#[test]
+fn flipping_any_live_byte_of_the_state_changes_the_hash() {
+    let mut state = snapshot();
+    let before = hash(&state);
+    // The counts say what is live; changing them is tested below, without reading past the end.
+    let counts = offset_of!(SnapshotHeader, robot_count)..offset_of!(SnapshotHeader, outcome);
+    let stamp = offset_of!(SnapshotHeader, publish_stamp_ns)..offset_of!(SnapshotHeader, epoch);
+    for at in live_bytes().filter(|at| !counts.contains(at)) {
+        state.as_mut_bytes()[at] ^= 1;
+        if stamp.contains(&at) {
+            assert_eq!(
+                hash(&state),
+                before,
+                "byte {at} is the transport's, not state"
+            );
+        } else {
+            assert_ne!(hash(&state), before, "byte {at} is state");
+        }
+        state.as_mut_bytes()[at] ^= 1;
+    }
+    state.header.robot_count -= 1;
+    assert_ne!(hash(&state), before);
+    state.header.robot_count += 1;
+    state.header.object_count += 1;
+    assert_ne!(hash(&state), before);
+}
+
+#[test]
+fn what_is_past_the_counts_is_no_state() {
+    let mut state = snapshot();
+    let before = hash(&state);
+    state.robots[COUNTS.robots as usize].position.x = 1.0;
+    state.objects[COUNTS.objects as usize].failures = 7;
+    assert_eq!(hash(&state), before);
+}
+
+#[test]
+fn a_snapshot_with_one_bad_value_is_refused() {
+    type Plant = fn(&mut WorldSnapshot);
+    let plants: [(Plant, &str); 13] = [
+        (|s| s.header.magic = 0, "magic"),
+        (|s| s.header.layout_version += 1, "layout"),
+        (|s| s.header.robot_count = 129, "over capacity"),
+        (|s| s.header.object_count = 2, "other run"),
+        (|s| s.header.outcome = 99, "outcome"),
+        (|s| s.header.held = 2, "held"),
+        (|s| s.robots[0].position.x = f64::NAN, "position"),
+        (|s| s.robots[1].task = 3, "task"),
+        (|s| s.robots[1].phase = 8, "phase"),
+        (|s| s.robots[1].grant_count = 33, "grant"),
+        (|s| s.objects[2].holder = 2, "holder"),
+        (|s| s.objects[2].status = 4, "status"),
+        (
+            |s| {
+                s.objects[0].has_goal = 1;
+                s.objects[0].goal.y = f64::INFINITY;
+            },
+            "goal",
+        ),
+    ];
+    assert!(Checked::new(&*snapshot(), COUNTS).is_ok());
+    for (plant, what) in plants {
+        let mut state = snapshot();
+        plant(&mut state);
+        assert!(
+            Checked::new(&*state, COUNTS).is_err(),
+            "{what} was let through"
+        );
+    }
+}
+
+#[test]
+fn a_command_with_one_bad_value_is_refused() {
+    type Plant = fn(&mut Command);
+    let plants: [(Plant, &str); 9] = [
+        (|c| c.robot = 2, "robot"),
+        (|c| c.phase = 8, "phase"),
+        (|c| c.grip = 3, "grip"),
+        (|c| c.go = 2, "go"),
+        (|c| c.claim.task = 3, "task"),
+        (|c| c.failure.cause = 3, "cause"),
+        (
+            |c| {
+                c.tick = 5;
+                c.valid_until_tick = 4;
+            },
+            "validity",
+        ),
+        (|c| c.path.count = 33, "points"),
+        (
+            |c| {
+                c.path.count = 1;
+                c.path.points[0].x = f64::NAN;
+            },
+            "point",
+        ),
+    ];
+    assert!(Command::default().validate(COUNTS).is_ok());
+    for (plant, what) in plants {
+        let mut command = Command::default();
+        plant(&mut command);
+        assert!(command.validate(COUNTS).is_err(), "{what} was let through");
+    }
+}
+
+#[test]
+fn constraints_must_be_sorted_in_range_and_not_reflexive() {
+    let mut table: Box<ConstraintTable> = zeroed();
+    table.count = 2;
+    table.constraints[0] = shm_types::Constraint {
+        before: 0,
+        after: 1,
+        kind: 1,
+    };
+    table.constraints[1] = shm_types::Constraint {
+        before: 0,
+        after: 2,
+        kind: 1,
+    };
+    assert_eq!(table.validate(COUNTS), Ok(()));
+    table.constraints.swap(0, 1);
+    assert!(matches!(
+        table.validate(COUNTS),
+        Err(Invalid::Inconsistent { .. })
+    ));
+    table.constraints[0] = shm_types::Constraint {
+        before: 0,
+        after: 0,
+        kind: 1,
+    };
+    assert!(table.validate(COUNTS).is_err());
+    table.constraints[0] = shm_types::Constraint {
+        before: 0,
+        after: 3,
+        kind: 1,
+    };
+    assert!(table.validate(COUNTS).is_err());
+}
+
+#[test]
+fn no_id_is_none() {
+    assert_eq!(shm_types::index(NONE), None);
+    assert_eq!(shm_types::index(5), Some(5));
+}
+
+proptest! {
+    #[test]
+    fn random_bytes_are_checked_without_panic(bytes in proptest::collection::vec(any::<u8>(), size_of::<Command>())) {
+        let command = Command::read_from_bytes(&bytes).unwrap();
+        if let Ok(command) = Checked::new(&command, COUNTS) {
+            prop_assert!(command.path.points().iter().all(|p| p.is_finite()));
+        }
+    }
+
+    #[test]
+    fn a_flipped_snapshot_is_refused_or_sound(flips in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20)) {
+        let mut state = snapshot();
+        let live: Vec<usize> = live_bytes().collect();
+        for (at, value) in flips {
+            let at = live[at.index(live.len())];
+            state.as_mut_bytes()[at] = value;
+        }
+        if let Ok(checked) = Checked::new(&*state, COUNTS) {
+            prop_assert_eq!(checked.robots().len(), 2);
+            prop_assert!(checked.robots().iter().all(|r| r.position.is_finite() && r.grant().len() <= 32));
+        }
+    }
+
+    #[test]
+    fn random_motion_batches_are_checked_without_panic(seed in any::<u64>()) {
+        let mut batch: Box<MotionBatch> = zeroed();
+        let mut x = seed | 1;
+        for byte in &mut batch.as_mut_bytes()[..4096] {
+            x ^= x << 13; x ^= x >> 7; x ^= x << 17;
+            *byte = x as u8;
+        }
+        let _ = Checked::new(&*batch, COUNTS).map(|b| b.motions().len() + b.events().len());
+    }
+}
