@@ -1,1 +1,18 @@
-//! The process shell: iceoryx2, clocks, cores.
+//! The process shell: the only crate that names iceoryx2, `core_affinity` or a clock.
+//!
+//! Responsible for: carrying messages between processes, the domain of a run and its clean-up,
+//! who waits for whom and for how long, starting and stopping processes, measuring.
+//! Not responsible for: what any machine decides (crates `world`, `planner`, `robot`), or what is
+//! printed (the binary).
+
+pub mod domain;
+pub mod histograms;
+pub mod options;
+pub mod report;
+pub mod roles;
+pub mod supervisor;
+
+pub use histograms::{Latencies, LatencySummary, Timed};
+pub use options::{Clock, Delay, Launcher, OptionError, Role, RunOptions, RunPlan, Wait};
+pub use report::{RoleReport, RunReport, WorldReport};
+pub use supervisor::{Observer, RunError};
