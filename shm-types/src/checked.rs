@@ -12,7 +12,7 @@ use crate::capacity::{
 use crate::{
     Activity, BodyKind, Command, ConstraintKind, ConstraintTable, ControlKind, ControlRequest,
     EventKind, FailureCause, Grip, HardAnswer, HardRequest, MotionBatch, NONE, Outcome, Phase,
-    PlannerReport, Point, RoleKind, TaskStatus, WorldSnapshot,
+    PlannerReport, Point, RecorderReport, RoleKind, TaskStatus, WorldSnapshot,
 };
 
 /// Why a message was refused.
@@ -288,6 +288,17 @@ impl Validate for HardAnswer {
 impl Validate for PlannerReport {
     fn validate(&self, _counts: Counts) -> Result<(), Invalid> {
         flag("busy", self.busy)
+    }
+}
+
+impl Validate for RecorderReport {
+    fn validate(&self, _counts: Counts) -> Result<(), Invalid> {
+        if self.lost > self.next_sequence {
+            return Err(Invalid::Inconsistent {
+                what: "the number of lost batches",
+            });
+        }
+        Ok(())
     }
 }
 

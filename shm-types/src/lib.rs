@@ -30,7 +30,7 @@ pub use command::{Claim, Command, Counters, Failure, PathRequest};
 pub use control::{ControlKind, ControlReply, ControlRequest, RoleKind};
 pub use hash::StateHash;
 pub use id::{NONE, index};
-pub use motion::{BodyKind, EventKind, EventRecord, MotionBatch, MotionRecord};
+pub use motion::{BodyKind, EventKind, EventRecord, MotionBatch, MotionRecord, RecorderReport};
 pub use planner::{
     Constraint, ConstraintKind, ConstraintTable, HardAnswer, HardRequest, PlannerReport,
 };

@@ -117,6 +117,23 @@ pub struct MotionBatch {
     pub events: [EventRecord; MAX_EVENTS],
 }
 
+/// How far the recorder has come: the world runs ahead of it only so many batches, where it waits
+/// for anybody at all.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, FromBytes, IntoBytes, Immutable, KnownLayout,
+)]
+#[repr(C)]
+pub struct RecorderReport {
+    /// Number of the batch it expects next: all before it are written or lost.
+    pub next_sequence: u64,
+    /// Batches that never reached it.
+    pub lost: u64,
+    /// Incarnation of its process.
+    pub incarnation: u32,
+    /// Always 0.
+    pub reserved: u32,
+}
+
 impl EventRecord {
     /// An event of `kind` at `time_ns` that names nobody.
     #[must_use]
