@@ -1,1 +1,35 @@
 //! The domain: geometry, scenario files, configuration space, generators.
+//!
+//! Responsible for: what a scene is, whether a scenario file describes one, where in it a body
+//! fits, and what computing costs.
+//! Not responsible for: what anybody decides (crate `planner`) or does (crates `robot`, `world`).
+//!
+//! Terms: a *draft* is a scenario as stated, unchecked; a *scene* is one that was checked, with
+//! all that follows from it. All lengths are metres of the world frame unless a name says
+//! otherwise.
+#![forbid(unsafe_code)]
+
+pub mod body;
+mod canonical;
+pub mod cspace;
+pub mod draft;
+pub mod geometry;
+pub mod lattice;
+pub mod problem;
+mod raster;
+pub mod scene;
+pub mod settings;
+pub mod shape;
+mod validate;
+pub mod work;
+
+pub use body::{Body, ClassId, Part, ROBOT_ALONE};
+pub use cspace::Occupancy;
+pub use draft::{Draft, Event, Move, ObjectDraft, RobotDraft, ShapeDraft, UserOrder, WallDraft};
+pub use geometry::{CONTACT_M, Vec2, overlap, point, swept_overlap, swept_regions_overlap, vec};
+pub use lattice::{Connectivity, Lattice};
+pub use problem::{Key, Problem, Problems};
+pub use scene::{ObjectSpec, RobotSpec, Scene};
+pub use settings::{Compute, HardMode, Method, Performance, Settings};
+pub use shape::{Shape, ShapeError, ShapeOutline};
+pub use work::{Budget, UNITS_PER_OBSTACLE, UNITS_PER_POLYGON_TEST, UNITS_PER_RESET};

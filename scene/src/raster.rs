@@ -1,0 +1,240 @@
+//! Which lattice points a body cannot be at, and which steps it cannot take, as bits.
+//!
+//! Responsible for: entering an obstacle, exactly (every step is a swept test, so thin and
+//! slanted obstacles between free points are seen), and fast.
+//! Not responsible for: what the obstacles are (`cspace`, and the crates above).
+//!
+//! How: the robot centres at which a part overlaps an obstacle form an open convex region, the
+//! Minkowski difference of both. Without circles it is bounded by straight sides, so in each
+//! row of the lattice it covers one run of points, found in closed form. A step is blocked if
+//! the difference, swept backwards along the step, covers its lower end: the same with other
+//! sides. Circles are tested point by point.
+
+use crate::body::Body;
+use crate::geometry::{CONTACT_M, Region, Vec2, all_normals, regions_overlap};
+use crate::lattice::Lattice;
+use crate::shape::{MAX_POLYGON_POINTS, Shape};
+
+/// The point itself.
+pub(crate) const POINT: u8 = 1;
+/// The step to the east (+x).
+pub(crate) const EAST: u8 = 1 << 1;
+/// The step to the north (+y).
+pub(crate) const NORTH: u8 = 1 << 2;
+/// The step to the north-east.
+pub(crate) const NORTH_EAST: u8 = 1 << 3;
+/// The step to the north-west.
+pub(crate) const NORTH_WEST: u8 = 1 << 4;
+/// Every bit.
+const ALL: u8 = POINT | EAST | NORTH | NORTH_EAST | NORTH_WEST;
+
+/// What each bit stands for, as columns and rows away.
+const MOVES: [(u8, i8, i8); 5] = [
+    (POINT, 0, 0),
+    (EAST, 1, 0),
+    (NORTH, 0, 1),
+    (NORTH_EAST, 1, 1),
+    (NORTH_WEST, -1, 1),
+];
+
+/// Sides of a Minkowski difference: both polygons, both sweeps, the step.
+const MAX_SIDES: usize = 2 * MAX_POLYGON_POINTS + 10;
+
+/// One byte a lattice point.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Raster {
+    pub(crate) bits: Vec<u8>,
+}
+
+/// A side: robot centres `r` with `normal · r < bound` are on its inner side.
+#[derive(Clone, Copy)]
+struct Side {
+    normal: Vec2,
+    bound: f64,
+}
+
+/// Half-planes whose intersection is blocked: a box, and the sides that are not along an axis.
+struct Blocked {
+    low: Vec2,
+    high: Vec2,
+    sides: [Side; MAX_SIDES],
+    count: usize,
+}
+
+impl Raster {
+    /// A raster with everything free.
+    pub(crate) fn free(lattice: &Lattice) -> Self {
+        Self {
+            bits: vec![0; lattice.len()],
+        }
+    }
+
+    /// The walls as one class of bodies meets them, with its clearance. Steps off the lattice
+    /// are blocked.
+    pub(crate) fn of_walls(lattice: &Lattice, body: &Body, walls: &[(Shape, Vec2)]) -> Self {
+        let mut raster = Self::free(lattice);
+        for (wall, at) in walls {
+            raster.block(lattice, body, &Region::standing(wall, *at), true);
+        }
+        raster.fence(lattice);
+        raster
+    }
+
+    /// Blocks every step that leaves the lattice.
+    fn fence(&mut self, lattice: &Lattice) {
+        let (width, height) = (lattice.width as usize, lattice.height as usize);
+        for row in self.bits.chunks_exact_mut(width) {
+            row[0] |= NORTH_WEST;
+            row[width - 1] |= EAST | NORTH_EAST;
+        }
+        for byte in &mut self.bits[width * (height - 1)..] {
+            *byte |= NORTH | NORTH_EAST | NORTH_WEST;
+        }
+    }
+
+    /// Enters one obstacle, met by all parts of a body.
+    pub(crate) fn block(
+        &mut self,
+        lattice: &Lattice,
+        body: &Body,
+        obstacle: &Region,
+        clearance: bool,
+    ) {
+        for part in &body.parts {
+            let region = Region::standing(part.shape(clearance), part.offset);
+            if region.shape.radius() + obstacle.shape.radius() > 0.0 {
+                self.block_round(lattice, &region, obstacle);
+            } else {
+                self.block_straight(lattice, &region, obstacle);
+            }
+        }
+    }
+
+    /// Closed form, row by row.
+    fn block_straight(&mut self, lattice: &Lattice, part: &Region, obstacle: &Region) {
+        for (bit, columns, rows) in MOVES {
+            let step = Vec2::new(f64::from(columns), f64::from(rows)) * lattice.pitch_m;
+            let moving = Region {
+                along: step,
+                ..*part
+            };
+            let blocked = Blocked::of(&moving, obstacle);
+            let (first, last) = indices(
+                blocked.low.y,
+                blocked.high.y,
+                lattice.origin.y,
+                lattice.pitch_m,
+                lattice.height,
+            );
+            for row in first..last {
+                let (low, high) = blocked.run(lattice.y(row));
+                let (from, to) =
+                    indices(low, high, lattice.origin.x, lattice.pitch_m, lattice.width);
+                if from < to {
+                    let start = row as usize * lattice.width as usize;
+                    for byte in &mut self.bits[start + from as usize..start + to as usize] {
+                        *byte |= bit;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Point by point, within the extents.
+    fn block_round(&mut self, lattice: &Lattice, part: &Region, obstacle: &Region) {
+        let pitch = lattice.pitch_m;
+        let (part_low, part_high) = part.extent();
+        let (low, high) = obstacle.extent();
+        // One step further to each side: where steps into the obstacle begin.
+        let margin = Vec2::new(pitch, pitch);
+        let (low, high) = (low - part_high - margin, high - part_low + margin);
+        let (first_row, last_row) = indices(low.y, high.y, lattice.origin.y, pitch, lattice.height);
+        let (first, last) = indices(low.x, high.x, lattice.origin.x, pitch, lattice.width);
+        for row in first_row..last_row {
+            for column in first..last {
+                let index = row as usize * lattice.width as usize + column as usize;
+                let at = part.at + Vec2::new(lattice.x(column), lattice.y(row));
+                let standing = Region { at, ..*part };
+                if regions_overlap(&standing, obstacle) {
+                    self.bits[index] |= ALL;
+                    continue;
+                }
+                for (bit, columns, rows) in &MOVES[1..] {
+                    if self.bits[index] & bit == 0 {
+                        let along = Vec2::new(f64::from(*columns), f64::from(*rows)) * pitch;
+                        if regions_overlap(&Region { along, ..standing }, obstacle) {
+                            self.bits[index] |= bit;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Blocked {
+    /// Where the part's reference point, 0 in `part`, cannot be.
+    fn of(part: &Region, obstacle: &Region) -> Self {
+        let mut blocked = Self {
+            low: Vec2::zeros(),
+            high: Vec2::zeros(),
+            sides: [Side {
+                normal: Vec2::zeros(),
+                bound: 0.0,
+            }; MAX_SIDES],
+            count: 0,
+        };
+        let apart = obstacle.at - part.at;
+        all_normals(part, obstacle, |normal| {
+            // part + r and the obstacle overlap beyond contact along every normal:
+            // support + support' + (r − apart)·normal > contact.
+            let room =
+                part.support(normal) + obstacle.support(-normal) - CONTACT_M - apart.dot(&normal);
+            if normal.y == 0.0 {
+                if normal.x > 0.0 {
+                    blocked.low.x = -room;
+                } else {
+                    blocked.high.x = room;
+                }
+            } else if normal.x == 0.0 {
+                if normal.y > 0.0 {
+                    blocked.low.y = -room;
+                } else {
+                    blocked.high.y = room;
+                }
+            } else if blocked.count < MAX_SIDES {
+                blocked.sides[blocked.count] = Side {
+                    normal: -normal,
+                    bound: room,
+                };
+                blocked.count += 1;
+            }
+            true
+        });
+        blocked
+    }
+
+    /// The open run of blocked robot centres in the row at `y`; empty when it ends before it
+    /// begins.
+    fn run(&self, y: f64) -> (f64, f64) {
+        let (mut low, mut high) = (self.low.x, self.high.x);
+        for side in &self.sides[..self.count] {
+            let x = (side.bound - side.normal.y * y) / side.normal.x;
+            if side.normal.x > 0.0 {
+                high = high.min(x);
+            } else {
+                low = low.max(x);
+            }
+        }
+        (low, high)
+    }
+}
+
+/// Lattice lines strictly between `low` and `high`: the first, and one past the last.
+fn indices(low: f64, high: f64, origin: f64, pitch: f64, count: u32) -> (u32, u32) {
+    let first = ((low - origin) / pitch).floor() + 1.0;
+    let end = ((high - origin) / pitch).ceil();
+    let first = first.clamp(0.0, f64::from(count));
+    let end = end.clamp(0.0, f64::from(count));
+    (first as u32, end as u32)
+}
