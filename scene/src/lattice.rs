@@ -13,7 +13,6 @@
 
 use std::sync::Arc;
 
-
 use crate::body::Body;
 use crate::geometry::{CONTACT_M, Vec2};
 use crate::shape::Shape;

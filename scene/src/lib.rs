@@ -10,26 +10,32 @@
 #![forbid(unsafe_code)]
 
 pub mod body;
-mod canonical;
+pub mod canonical;
 pub mod cspace;
 pub mod draft;
+mod file;
 pub mod geometry;
 pub mod lattice;
 pub mod problem;
 mod raster;
+pub mod scenario;
 pub mod scene;
+pub mod schema;
 pub mod settings;
 pub mod shape;
 mod validate;
 pub mod work;
 
 pub use body::{Body, ClassId, Part, ROBOT_ALONE};
+pub use canonical::to_canonical_toml;
 pub use cspace::Occupancy;
 pub use draft::{Draft, Event, Move, ObjectDraft, RobotDraft, ShapeDraft, UserOrder, WallDraft};
 pub use geometry::{CONTACT_M, Vec2, overlap, point, swept_overlap, swept_regions_overlap, vec};
 pub use lattice::{Connectivity, Lattice};
 pub use problem::{Key, Problem, Problems};
+pub use scenario::{Located, ScenarioError, parse};
 pub use scene::{ObjectSpec, RobotSpec, Scene};
+pub use schema::json_schema;
 pub use settings::{Compute, HardMode, Method, Performance, Settings};
 pub use shape::{Shape, ShapeError, ShapeOutline};
 pub use work::{Budget, UNITS_PER_OBSTACLE, UNITS_PER_POLYGON_TEST, UNITS_PER_RESET};

@@ -101,6 +101,20 @@ pub(crate) fn shape_of(draft: &ShapeDraft) -> Result<Shape, ShapeError> {
     }
 }
 
+/// The robot centred against the object's −y side (rule 2); [0, 0] where a shape is none, which
+/// is then reported as such.
+pub(crate) fn default_grasp(robot: &ShapeDraft, object: &ShapeDraft) -> [f64; 2] {
+    match (shape_of(robot), shape_of(object)) {
+        (Ok(robot), Ok(object)) => {
+            let (object_low, object_high) = object.extent();
+            let (robot_low, robot_high) = robot.extent();
+            let middle = (object_low.x + object_high.x - robot_low.x - robot_high.x) / 2.0;
+            [middle, object_low.y - robot_high.y]
+        }
+        _ => [0.0, 0.0],
+    }
+}
+
 fn wall_shape(wall: &WallDraft) -> Result<(Shape, Vec2), ShapeError> {
     match wall {
         WallDraft::Box([x0, y0, x1, y1]) => rectangle(Vec2::new(*x0, *y0), Vec2::new(*x1, *y1)),

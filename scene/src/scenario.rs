@@ -1,0 +1,145 @@
+//! Reading a scenario file, and saying what is wrong with it: file, line, key, reason.
+//!
+//! Responsible for: turning text into a [`Scene`], and problems into diagnostics that point at
+//! the text.
+//! Not responsible for: opening files, or printing.
+
+use std::sync::Arc;
+
+use miette::{Diagnostic, LabeledSpan, NamedSource, SourceSpan};
+
+use crate::file::{Range, ScenarioFile};
+use crate::problem::Problem;
+use crate::scene::Scene;
+
+/// One problem with its place in the text.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+#[error("{file}:{line}: {what}")]
+pub struct Located {
+    /// Name of the source the text came from.
+    pub file: String,
+    /// Line of the text, from 1.
+    pub line: usize,
+    /// The key and what is wrong with it.
+    pub what: String,
+    #[source_code]
+    text: NamedSource<Arc<str>>,
+    #[label(collection)]
+    labels: Vec<LabeledSpan>,
+    #[help]
+    help: Option<String>,
+}
+
+/// A text that is no usable scenario, with everything that was found wrong with it.
+///
+/// A text that is not even TOML of the right structure has one problem: what follows the first
+/// such mistake cannot be judged.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+#[error("{file} is not a usable scenario ({})", count(.problems.len()))]
+pub struct ScenarioError {
+    /// Name of the source the text came from.
+    pub file: String,
+    /// What is wrong, in the order found.
+    #[related]
+    pub problems: Vec<Located>,
+}
+
+fn count(problems: usize) -> String {
+    match problems {
+        1 => "1 problem".to_owned(),
+        n => format!("{n} problems"),
+    }
+}
+
+impl ScenarioError {
+    /// One line for each problem: file, line, key, reason.
+    #[must_use]
+    pub fn plain(&self) -> String {
+        let lines: Vec<_> = self.problems.iter().map(ToString::to_string).collect();
+        lines.join("\n")
+    }
+}
+
+/// Reads a scenario. `source_name` is what messages call the text, usually a file name.
+///
+/// # Errors
+/// Everything that is wrong with it, each with its line.
+pub fn parse(text: &str, source_name: &str) -> Result<Scene, ScenarioError> {
+    let report = Report {
+        file: source_name,
+        text: Arc::from(text),
+    };
+    let file: ScenarioFile = toml::from_str(text).map_err(|error| report.malformed(&error))?;
+    file.draft()
+        .and_then(|draft| Scene::new(draft).map_err(|problems| problems.0))
+        .map_err(|problems| report.problems(&file, &problems))
+}
+
+struct Report<'a> {
+    file: &'a str,
+    text: Arc<str>,
+}
+
+impl Report<'_> {
+    fn malformed(&self, error: &toml::de::Error) -> ScenarioError {
+        let span = error.span().unwrap_or(0..0);
+        let labels = vec![label("here", &span)];
+        self.error(vec![self.located(
+            &span,
+            error.message().to_owned(),
+            labels,
+            None,
+        )])
+    }
+
+    fn problems(&self, file: &ScenarioFile, problems: &[Problem]) -> ScenarioError {
+        let located = problems
+            .iter()
+            .map(|problem| {
+                let span = file.place(problem.key);
+                let mut labels = Vec::new();
+                if let Some(span) = &span {
+                    labels.push(label(&problem.key.to_string(), span));
+                }
+                for also in &problem.also {
+                    if let Some(span) = file.place(*also) {
+                        labels.push(label(&also.to_string(), &span));
+                    }
+                }
+                let span = span.unwrap_or(0..0);
+                self.located(&span, problem.to_string(), labels, problem.help.clone())
+            })
+            .collect();
+        self.error(located)
+    }
+
+    fn located(
+        &self,
+        span: &Range,
+        what: String,
+        labels: Vec<LabeledSpan>,
+        help: Option<String>,
+    ) -> Located {
+        let before = &self.text.as_bytes()[..span.start.min(self.text.len())];
+        Located {
+            file: self.file.to_owned(),
+            line: before.iter().filter(|byte| **byte == b'\n').count() + 1,
+            what,
+            text: NamedSource::new(self.file, Arc::clone(&self.text)),
+            labels,
+            help,
+        }
+    }
+
+    fn error(&self, problems: Vec<Located>) -> ScenarioError {
+        ScenarioError {
+            file: self.file.to_owned(),
+            problems,
+        }
+    }
+}
+
+fn label(text: &str, span: &Range) -> LabeledSpan {
+    let span = SourceSpan::from((span.start, span.len()));
+    LabeledSpan::new_with_span(Some(text.to_owned()), span)
+}
