@@ -10,6 +10,7 @@
 #![forbid(unsafe_code)]
 
 pub mod body;
+pub mod builtin;
 pub mod canonical;
 pub mod cspace;
 pub mod draft;
@@ -18,6 +19,7 @@ pub mod geometry;
 pub mod lattice;
 pub mod problem;
 mod raster;
+pub mod reach;
 pub mod scenario;
 pub mod scene;
 pub mod schema;
@@ -27,12 +29,14 @@ mod validate;
 pub mod work;
 
 pub use body::{Body, ClassId, Part, ROBOT_ALONE};
+pub use builtin::{BUILTIN, Builtin, builtin};
 pub use canonical::to_canonical_toml;
 pub use cspace::Occupancy;
 pub use draft::{Draft, Event, Move, ObjectDraft, RobotDraft, ShapeDraft, UserOrder, WallDraft};
 pub use geometry::{CONTACT_M, Vec2, overlap, point, swept_overlap, swept_regions_overlap, vec};
 pub use lattice::{Connectivity, Lattice};
 pub use problem::{Key, Problem, Problems};
+pub use reach::{CycleKind, Flood, Infeasible, certificate};
 pub use scenario::{Located, ScenarioError, parse};
 pub use scene::{ObjectSpec, RobotSpec, Scene};
 pub use schema::json_schema;

@@ -1,0 +1,58 @@
+//! The shipped scenarios, inside the binary.
+//!
+//! Responsible for: their names and texts. The texts themselves, each with a comment that says
+//! what it is there for, are the files of `scenarios/`.
+
+/// A scenario that comes with the program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Builtin {
+    /// Its name: the file's without its ending.
+    pub name: &'static str,
+    /// The whole file.
+    pub text: &'static str,
+}
+
+impl Builtin {
+    /// What it is there for: its opening comment, as one paragraph.
+    #[must_use]
+    pub fn about(&self) -> String {
+        let comment = self.text.lines().map_while(|line| line.strip_prefix('#'));
+        let words: Vec<_> = comment.flat_map(str::split_whitespace).collect();
+        words.join(" ")
+    }
+}
+
+/// Lists files of `scenarios/` by name.
+macro_rules! builtin {
+    ($($name:literal,)+) => {
+        &[$(Builtin {
+            name: $name,
+            text: include_str!(concat!("../../scenarios/", $name, ".toml")),
+        },)+]
+    };
+}
+
+/// Every shipped scenario.
+pub const BUILTIN: &[Builtin] = builtin!["e1", "h1", "swap",];
+
+/// The shipped scenario of this name.
+#[must_use]
+pub fn builtin(name: &str) -> Option<&'static Builtin> {
+    BUILTIN.iter().find(|scenario| scenario.name == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_shipped_scenario_reads_and_says_what_it_is_for() {
+        for Builtin { name, text } in BUILTIN {
+            let scene = crate::parse(text, name).unwrap_or_else(|e| panic!("{}", e.plain()));
+            assert_eq!(scene.name, *name);
+            assert!(scene.lattice.exact, "{name} has no exact lattice");
+            assert!(builtin(name).unwrap().about().len() > 40, "{name}");
+        }
+        assert_eq!(builtin("nowhere"), None);
+    }
+}
