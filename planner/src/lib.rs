@@ -1,1 +1,42 @@
 //! The thinking: constraints, priorities, selection, path search.
+//!
+//! Responsible for: which tasks come before which (`easy`, `hard`), what each is worth
+//! (`priority`), who takes which (`selection`), ways through the room (`search`, `field`,
+//! `obstacles`), what cannot be solved at all (`certificate`), and the planner service
+//! (`service`).
+//! Not responsible for: what a robot does about it (crate `robot`), what is allowed to move
+//! (crate `world`).
+//!
+//! Everything that may take long is a resumable computation: `begin` copies its inputs once,
+//! `advance` works until it is done or its `Budget` is spent. The outcome and the units are the
+//! same whatever the budgets. After construction nothing allocates.
+//!
+//! Terms: the *initial* place of an object is where it last stood on the ground (rule 9). An
+//! *edge* `before → after` keeps `after` from being selected until `before` is completed
+//! (rule 13).
+#![forbid(unsafe_code)]
+
+mod certificate;
+pub mod easy;
+mod field;
+mod frontier;
+mod joints;
+mod kind;
+mod meter;
+pub mod obstacles;
+mod places;
+mod priority;
+mod search;
+mod selection;
+mod service;
+
+pub use certificate::{Infeasible, certificate};
+pub use easy::EasyConstraints;
+pub use field::DistanceField;
+pub use kind::Kind;
+pub use obstacles::{Robots, WorldView};
+pub use places::Places;
+pub use priority::{Priority, PriorityGraph};
+pub use search::PathSearch;
+pub use selection::Selection;
+pub use service::{Planner, PlannerInput, PlannerOutput};
