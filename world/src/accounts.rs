@@ -1,0 +1,104 @@
+//! What a run is charged: each robot's time, and the world's own counts.
+//!
+//! Responsible for: exactly one [`Activity`] per robot and tick (rule 24), so that for each robot
+//! they sum up to the ticks; how many participants were computing.
+//! Not responsible for: what planning costs (the participants count that themselves).
+
+use shm_types::{Activity, Checked, Phase, PlannerReport};
+
+use crate::state::Robot;
+
+/// Ticks of one robot by what it did in them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ActivityTimes {
+    ticks: [u64; Activity::ALL.len()],
+}
+
+impl ActivityTimes {
+    /// Ticks spent on `activity`.
+    #[must_use]
+    pub const fn ticks(&self, activity: Activity) -> u64 {
+        self.ticks[activity as usize]
+    }
+
+    /// All ticks so far.
+    #[must_use]
+    pub fn total(&self) -> u64 {
+        self.ticks.iter().sum()
+    }
+
+    const fn add(&mut self, activity: Activity) {
+        self.ticks[activity as usize] += 1;
+    }
+}
+
+/// What the world has counted so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WorldCounters {
+    /// Path requests that could not be granted whole at once, and waited in the queue.
+    pub grants_refused: u64,
+    /// Path requests that start at the wrong place, leave the room or cross a wall: dropped.
+    pub invalid_requests: u64,
+    /// Ticks in which a live robot was held because its newest command was past its validity.
+    pub stale_commands: u64,
+    /// Claims refused: too late, forbidden by a constraint, barred, or of no free task.
+    pub invalid_claims: u64,
+    /// Claims of two robots on one task in one epoch (always 0: all select alike).
+    pub selection_conflicts: u64,
+    /// Failures counted (rule 21).
+    pub task_failures: u64,
+    /// Failures counted without the planner's answer, its deadline having passed.
+    pub answers_missed: u64,
+    /// Grips asked for that could not begin.
+    pub grips_refused: u64,
+    /// Invariants found broken.
+    pub violations: u64,
+    /// Exact swept tests of two shapes.
+    pub swept_tests: u64,
+}
+
+/// What `robot` did in a tick: a body that moved was moving whatever its robot says, and one that
+/// stood still was not.
+pub(crate) fn activity_of(robot: &Robot, fresh: bool, held: bool) -> Activity {
+    if robot.moved {
+        return Activity::Moving;
+    }
+    if robot.gripped {
+        return Activity::Gripping;
+    }
+    if !robot.link.live {
+        return Activity::Idle;
+    }
+    if held || !fresh {
+        return Activity::Waiting;
+    }
+    match robot.link.activity {
+        Activity::Moving | Activity::Gripping => Activity::Waiting,
+        said => said,
+    }
+}
+
+/// Enters every robot's tick and returns how many participants were computing: what one shared
+/// computer is divided by. Waiting for the planner's answer is computing to the robot's account
+/// but takes none of the computer's time.
+pub(crate) fn settle(
+    robots: &mut [Robot],
+    planner: Option<&PlannerReport>,
+    tick: u64,
+    held: bool,
+) -> u32 {
+    let mut busy = planner.map_or(0, |report| report.busy);
+    for robot in robots {
+        robot.activity = activity_of(robot, robot.link.is_fresh(tick), held);
+        robot.times.add(robot.activity);
+        if robot.activity == Activity::Computing && robot.link.phase != Phase::Failing {
+            busy += 1;
+        }
+    }
+    busy
+}
+
+/// The report inside a checked message.
+pub(crate) fn report<'a>(planner: Option<Checked<'a, PlannerReport>>) -> Option<&'a PlannerReport> {
+    planner.map(Checked::get)
+}

@@ -1,0 +1,62 @@
+//! Commands: taking in what robots want.
+//!
+//! Responsible for: which commands are taken (right incarnation, newer than the last), in the
+//! order of the robots. Not responsible for: what each part of one means.
+
+use scene::Scene;
+use shm_types::{Activity, Checked, Command, ConstraintTable, Grip, Phase};
+
+use crate::journal::Journal;
+use crate::requests;
+use crate::step::{World, WorldInput};
+
+impl World {
+    /// Takes the new ones of the newest commands.
+    pub(crate) fn take_commands(
+        &mut self,
+        scene: &Scene,
+        input: &WorldInput<'_>,
+        known: Option<&ConstraintTable>,
+        journal: &mut Journal<'_>,
+    ) {
+        let commands = input.commands.iter().take(self.robots.len());
+        for (i, command) in commands.enumerate() {
+            let Some(command) = command.map(Checked::get) else {
+                continue;
+            };
+            let link = &self.robots[i].link;
+            let new = link.live
+                && command.robot as usize == i
+                && command.incarnation == link.incarnation
+                && command.sequence > link.sequence;
+            if new {
+                self.take_intent(i, command);
+                self.take_claim(i, command.claim, known, journal);
+                self.take_failure(i, command.failure);
+                self.take_request(scene, i, command);
+            }
+        }
+        for robot in &self.robots {
+            let stale = robot.link.live && robot.link.sequence > 0;
+            self.counters.stale_commands += u64::from(stale && !robot.link.is_fresh(self.tick));
+        }
+    }
+
+    fn take_intent(&mut self, i: usize, command: &Command) {
+        let link = &mut self.robots[i].link;
+        link.sequence = command.sequence;
+        link.valid_until_tick = command.valid_until_tick;
+        link.settled_at_change = command.settled_at_change;
+        link.go = command.go == 1;
+        // Checked messages hold only codes that decode.
+        link.grip = Grip::decode(command.grip).unwrap_or(Grip::Keep);
+        link.phase = Phase::decode(command.phase).unwrap_or(Phase::Idle);
+        link.activity = Activity::decode(command.activity).unwrap_or(Activity::Idle);
+    }
+
+    fn take_request(&mut self, scene: &Scene, i: usize, command: &Command) {
+        let robot = &mut self.robots[i];
+        let sound = requests::take(scene, &self.bodies, robot, &command.path, self.tick);
+        self.counters.invalid_requests += u64::from(!sound);
+    }
+}

@@ -1,0 +1,400 @@
+//! Grants: space is given to one robot before it moves, so that no two ever collide, whatever is
+//! late, stale or dead.
+//!
+//! Responsible for: the queue of open requests, oldest first and then by id; how far each is
+//! granted in this tick. Not responsible for: whether a request is sound (`requests.rs`), moving
+//! along what is granted (`motion.rs`).
+//!
+//! Terms: the *region* of a robot is what its body covers from where it stands along all that is
+//! granted to it. Two passes a tick:
+//!
+//! - *In space*: a grant grows as far as the sweep of the body meets no grounded object and no
+//!   other robot's region. Regions stay disjoint, so wherever a robot stops on its own grant it
+//!   blocks granted path of nobody (no hold-and-wait).
+//! - *In time*: what is not granted in space grows by at most what the tick's motion uses up at
+//!   once, if the body meets no other body at any instant of the tick, nor what stays granted
+//!   to others after it. Robots are asked again whenever the one that blocked them goes further:
+//!   a fixed point that works from front to back, whatever the ids, so that robots follow one
+//!   another nose to tail and lose no time. After the tick the regions are disjoint again.
+
+use scene::{Scene, Vec2};
+
+use crate::bodies::{Bodies, Sweep};
+use crate::broad::Aabb;
+use crate::path::{ARRIVAL_M, Track};
+use crate::state::Robot;
+
+/// Into how many equal steps the motion of one tick is cut where it cannot be granted whole: a
+/// robot stops at most this share of it short of what is in its way.
+const STEPS_PER_TICK: f64 = 64.0;
+
+/// Why an extension is refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Refusal {
+    /// A grounded object is in the way.
+    Object,
+    /// Another robot is.
+    Robot(usize),
+}
+
+/// One tick of extension, for one robot.
+struct Farthest {
+    /// Where the extension ends, and whether that is the segment's own end.
+    end: Option<(Vec2, bool)>,
+    refusal: Option<Refusal>,
+}
+
+/// The passes' working memory, kept over ticks.
+#[derive(Clone, Debug)]
+pub(crate) struct Grants {
+    queue: Vec<usize>,
+    /// Box of each robot's region.
+    regions: Vec<Aabb>,
+    /// Who is to be asked again.
+    again: Vec<bool>,
+    blocked_by: Vec<Option<usize>>,
+    /// Arc length of one tick at full speed, m.
+    tick_m: f64,
+}
+
+/// What the passes look at besides the robots.
+#[derive(Clone, Copy)]
+pub(crate) struct Surroundings<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) bodies: &'a Bodies,
+}
+
+impl Grants {
+    /// For `robots` robots that move `tick_m` in a tick.
+    pub(crate) fn new(robots: usize, tick_m: f64) -> Self {
+        let nowhere = Aabb::around(Vec2::zeros(), Vec2::zeros());
+        Self {
+            queue: Vec::with_capacity(robots),
+            regions: vec![nowhere; robots],
+            again: vec![false; robots],
+            blocked_by: vec![None; robots],
+            tick_m,
+        }
+    }
+
+    /// Grants what can be granted at `tick`, and sets every robot's track for its motion.
+    /// Returns how many requests were refused for the first time.
+    pub(crate) fn extend(
+        &mut self,
+        around: Surroundings<'_>,
+        robots: &mut [Robot],
+        tick: u64,
+    ) -> u64 {
+        self.queue.clear();
+        for (i, robot) in robots.iter().enumerate() {
+            let open = !robot.rest.is_empty() && !robot.hand.is_moving();
+            if open && robot.link.is_fresh(tick) {
+                self.queue.push(i);
+            }
+            self.regions[i] = region_of(around, robot);
+        }
+        self.queue
+            .sort_unstable_by_key(|&i| (robots[i].request_tick, i));
+        for q in 0..self.queue.len() {
+            self.extend_in_space(around, robots, self.queue[q]);
+        }
+        for robot in robots.iter_mut() {
+            robot.track = set_out(robot, tick, self.tick_m);
+        }
+        let mut refused = 0;
+        for &i in &self.queue {
+            if !robots[i].rest.is_empty() && !robots[i].refused {
+                robots[i].refused = true;
+                refused += 1;
+            }
+        }
+        self.extend_all_in_time(around, robots, tick);
+        refused
+    }
+
+    fn extend_in_space(&mut self, around: Surroundings<'_>, robots: &mut [Robot], i: usize) {
+        while let Some(to) = robots[i].rest.first()
+            && has_room(&robots[i])
+        {
+            let from = robots[i].grant_end();
+            let length_m = (to - from).norm();
+            let farthest = farthest(from, to, length_m, self.tick_m, |end| {
+                self.check_in_space(around, robots, i, from, end)
+            });
+            let Some((end, whole)) = farthest.end else {
+                break;
+            };
+            self.grant(around, &mut robots[i], i, end, whole);
+            if !whole {
+                break;
+            }
+        }
+    }
+
+    /// Asks everyone once, and again whenever who blocked it has gone further.
+    fn extend_all_in_time(&mut self, around: Surroundings<'_>, robots: &mut [Robot], tick: u64) {
+        for &i in &self.queue {
+            self.again[i] = moves(&robots[i], tick);
+            self.blocked_by[i] = None;
+        }
+        let mut progress = true;
+        while progress {
+            progress = false;
+            for q in 0..self.queue.len() {
+                let i = self.queue[q];
+                if !std::mem::take(&mut self.again[i]) {
+                    continue;
+                }
+                if self.extend_in_time(around, robots, i) {
+                    for &behind in &self.queue {
+                        if self.blocked_by[behind] == Some(i) {
+                            self.again[behind] = true;
+                            self.blocked_by[behind] = None;
+                            progress = true;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Extends one robot's grant by what it can use up within this tick; whether it got any.
+    fn extend_in_time(&mut self, around: Surroundings<'_>, robots: &mut [Robot], i: usize) -> bool {
+        let mut extended = false;
+        while let Some(to) = robots[i].rest.first()
+            && has_room(&robots[i])
+        {
+            let track = robots[i].track;
+            let left_m = self.tick_m - track.moved_m();
+            let at_grant_end = track.used() == robots[i].grant.points().len();
+            if !at_grant_end || track.is_full() || left_m <= ARRIVAL_M {
+                break;
+            }
+            let from = track.end();
+            let step_m = self.tick_m / STEPS_PER_TICK;
+            let farthest = farthest(from, to, left_m, step_m, |end| {
+                self.check_in_time(around, robots, i, &track, end)
+            });
+            if let Some(Refusal::Robot(other)) = farthest.refusal {
+                self.blocked_by[i] = Some(other);
+            }
+            let Some((end, whole)) = farthest.end else {
+                break;
+            };
+            self.grant(around, &mut robots[i], i, end, whole);
+            let robot = &mut robots[i];
+            robot.track = Track::walk(robot.position, &robot.grant, self.tick_m);
+            extended = true;
+            if !whole {
+                break;
+            }
+        }
+        extended
+    }
+
+    fn grant(
+        &mut self,
+        around: Surroundings<'_>,
+        robot: &mut Robot,
+        i: usize,
+        end: Vec2,
+        whole: bool,
+    ) {
+        let sweep = Sweep {
+            class: robot.class(around.scene),
+            from: robot.grant_end(),
+            to: end,
+        };
+        self.regions[i] = self.regions[i].joined(around.bodies.region(sweep, false));
+        if robot.cut && !robot.grant.is_empty() {
+            robot.grant.replace_last(end);
+        } else {
+            robot.grant.push(end);
+        }
+        robot.cut = !whole;
+        if whole {
+            robot.rest.drop_front(1);
+        }
+    }
+
+    fn check_in_space(
+        &self,
+        around: Surroundings<'_>,
+        robots: &[Robot],
+        i: usize,
+        from: Vec2,
+        to: Vec2,
+    ) -> Result<(), Refusal> {
+        let sweep = check_ground(around, &robots[i], from, to)?;
+        let region = around.bodies.region(sweep, true);
+        for (j, other) in robots.iter().enumerate() {
+            if j == i || !region.meets(&self.regions[j]) {
+                continue;
+            }
+            if meets_path(around, sweep, other, other.position, other.grant.points()) {
+                return Err(Refusal::Robot(j));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_in_time(
+        &self,
+        around: Surroundings<'_>,
+        robots: &[Robot],
+        i: usize,
+        track: &Track,
+        to: Vec2,
+    ) -> Result<(), Refusal> {
+        let sweep = check_ground(around, &robots[i], track.end(), to)?;
+        let region = around.bodies.region(sweep, true);
+        let longer = track.then(to);
+        for (j, other) in robots.iter().enumerate() {
+            if j == i || !region.meets(&self.regions[j]) {
+                continue;
+            }
+            let ahead = &other.grant.points()[other.track.used()..];
+            let after =
+                !ahead.is_empty() && meets_path(around, sweep, other, other.track.end(), ahead);
+            let meets = after
+                || around.bodies.tracks_meet(
+                    around.scene,
+                    (sweep.class, &longer),
+                    true,
+                    (other.class(around.scene), &other.track),
+                    (track.moved_m(), self.tick_m),
+                );
+            if meets {
+                return Err(Refusal::Robot(j));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether one more point can be granted: a cut point is moved, any other added.
+fn has_room(robot: &Robot) -> bool {
+    !robot.grant.is_full() || robot.cut
+}
+
+/// Whether a robot moves in this tick, if it has where to go.
+fn moves(robot: &Robot, tick: u64) -> bool {
+    robot.link.is_fresh(tick) && robot.link.go && !robot.hand.is_moving()
+}
+
+fn set_out(robot: &Robot, tick: u64, tick_m: f64) -> Track {
+    if moves(robot, tick) {
+        Track::walk(robot.position, &robot.grant, tick_m)
+    } else {
+        Track::still(robot.position)
+    }
+}
+
+/// Box of what a robot covers from where it stands along its whole grant.
+fn region_of(around: Surroundings<'_>, robot: &Robot) -> Aabb {
+    let class = robot.class(around.scene);
+    let standing = around
+        .bodies
+        .region(Sweep::standing(class, robot.position), false);
+    robot
+        .grant
+        .points()
+        .iter()
+        .fold(standing, |region, &point| {
+            region.joined(around.bodies.region(Sweep::standing(class, point), false))
+        })
+}
+
+/// Whether a sweep with clearance meets the body of `other` along `path` from `start`.
+fn meets_path(
+    around: Surroundings<'_>,
+    sweep: Sweep,
+    other: &Robot,
+    start: Vec2,
+    path: &[Vec2],
+) -> bool {
+    let class = other.class(around.scene);
+    let mut from = start;
+    if path.is_empty() {
+        let standing = Sweep::standing(class, start);
+        return around
+            .bodies
+            .sweeps_meet(around.scene, sweep, true, standing);
+    }
+    path.iter().any(|&to| {
+        let piece = Sweep { class, from, to };
+        from = to;
+        around.bodies.sweeps_meet(around.scene, sweep, true, piece)
+    })
+}
+
+fn check_ground(
+    around: Surroundings<'_>,
+    robot: &Robot,
+    from: Vec2,
+    to: Vec2,
+) -> Result<Sweep, Refusal> {
+    let Surroundings { scene, bodies } = around;
+    let sweep = Sweep {
+        class: robot.class(scene),
+        from,
+        to,
+    };
+    let waiver = |object| bodies.waiver(scene, robot, object);
+    match bodies.object_met(scene, sweep, true, waiver) {
+        Some(_) => Err(Refusal::Object),
+        None => Ok(sweep),
+    }
+}
+
+/// The farthest point from `from` towards `to`, at most `limit_m` away, that `check` lets pass:
+/// the whole way, or else a multiple of `step_m`.
+fn farthest(
+    from: Vec2,
+    to: Vec2,
+    limit_m: f64,
+    step_m: f64,
+    mut check: impl FnMut(Vec2) -> Result<(), Refusal>,
+) -> Farthest {
+    let length_m = (to - from).norm();
+    let whole = length_m <= limit_m + ARRIVAL_M;
+    let limit_m = limit_m.min(length_m);
+    let towards = (to - from) / length_m.max(ARRIVAL_M);
+    let end = if whole { to } else { from + towards * limit_m };
+    let Err(mut refusal) = check(end) else {
+        return Farthest {
+            end: Some((end, whole)),
+            refusal: None,
+        };
+    };
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a positive number of steps within a room"
+    )]
+    let (mut granted, mut refused) = (0_u32, ((limit_m / step_m).ceil() as u32).max(1));
+    let mut farthest = None;
+    while refused - granted > 1 {
+        // The first step first: whoever stands right in front of something asks but twice.
+        let steps = if granted == 0 {
+            1
+        } else {
+            granted + (refused - granted) / 2
+        };
+        let end = from + towards * (f64::from(steps) * step_m);
+        match check(end) {
+            Ok(()) => {
+                granted = steps;
+                farthest = Some((end, false));
+            }
+            Err(nearer) => {
+                refused = steps;
+                refusal = nearer;
+            }
+        }
+    }
+    Farthest {
+        end: farthest,
+        refusal: Some(refusal),
+    }
+}

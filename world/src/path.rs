@@ -1,0 +1,200 @@
+//! Polylines of fixed capacity, and where a robot is during one tick.
+//!
+//! Responsible for: corner points still ahead, walking along them by arc length, exactly landing
+//! on the points themselves. Not responsible for: who may go where (`grants.rs`).
+//!
+//! Terms: a *track* is a robot's motion within one tick: it moves at full speed from the start of
+//! the tick and then stands, so the arc length gone is also the time.
+
+use scene::Vec2;
+use shm_types::capacity::MAX_PATH_POINTS;
+
+/// Nearer than this to a corner point (m), a robot is at it: rounding of lengths must not cost a
+/// tick. A thousandth of what divides touching from overlap.
+pub(crate) const ARRIVAL_M: f64 = scene::CONTACT_M / 1_000.0;
+
+/// Most straight pieces one robot moves along in one tick: three corners, as the motion batch's
+/// capacity says. Arc length beyond is lost to that tick.
+pub(crate) const MAX_PIECES: usize =
+    shm_types::capacity::MAX_MOTIONS / (2 * shm_types::capacity::MAX_ROBOTS);
+
+/// Corner points still ahead, nearest first. The start is not among them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Path {
+    points: [Vec2; MAX_PATH_POINTS],
+    count: usize,
+}
+
+impl Path {
+    pub(crate) const EMPTY: Self = Self {
+        points: [Vec2::new(0.0, 0.0); MAX_PATH_POINTS],
+        count: 0,
+    };
+
+    pub(crate) fn points(&self) -> &[Vec2] {
+        &self.points[..self.count]
+    }
+
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    pub(crate) const fn is_full(&self) -> bool {
+        self.count == MAX_PATH_POINTS
+    }
+
+    pub(crate) const fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    pub(crate) fn first(&self) -> Option<Vec2> {
+        self.points().first().copied()
+    }
+
+    pub(crate) fn last(&self) -> Option<Vec2> {
+        self.points().last().copied()
+    }
+
+    /// Adds a point at the end; a full path stays as it is.
+    pub(crate) const fn push(&mut self, point: Vec2) {
+        if self.count < MAX_PATH_POINTS {
+            self.points[self.count] = point;
+            self.count += 1;
+        }
+    }
+
+    /// Moves the last point, of a path that has one.
+    pub(crate) const fn replace_last(&mut self, point: Vec2) {
+        if self.count > 0 {
+            self.points[self.count - 1] = point;
+        }
+    }
+
+    /// Drops the nearest `count` points.
+    pub(crate) fn drop_front(&mut self, count: usize) {
+        let count = count.min(self.count);
+        self.points.copy_within(count..self.count, 0);
+        self.count -= count;
+    }
+
+    /// Length from `start` along all points, m.
+    pub(crate) fn length_from(&self, start: Vec2) -> f64 {
+        let mut at = start;
+        let mut length_m = 0.0;
+        for &point in self.points() {
+            length_m += (point - at).norm();
+            at = point;
+        }
+        length_m
+    }
+}
+
+/// Motion of one robot within one tick.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Track {
+    corners: [(f64, Vec2); MAX_PIECES + 1],
+    pieces: usize,
+    used: usize,
+}
+
+impl Track {
+    /// Standing at `position` all the tick.
+    pub(crate) const fn still(position: Vec2) -> Self {
+        Self {
+            corners: [(0.0, position); MAX_PIECES + 1],
+            pieces: 0,
+            used: 0,
+        }
+    }
+
+    /// From `start` along `path`, at most `budget_m` of arc length and [`MAX_PIECES`] pieces.
+    /// Lands exactly on the points it reaches.
+    pub(crate) fn walk(start: Vec2, path: &Path, budget_m: f64) -> Self {
+        let mut track = Self::still(start);
+        let mut at = start;
+        let mut gone_m = 0.0;
+        for &point in path.points() {
+            let length_m = (point - at).norm();
+            let left_m = budget_m - gone_m;
+            if length_m == 0.0 {
+                track.used += 1;
+                continue;
+            }
+            if track.pieces == MAX_PIECES || left_m <= ARRIVAL_M {
+                break;
+            }
+            let arrives = length_m <= left_m + ARRIVAL_M;
+            if arrives {
+                gone_m = (gone_m + length_m).min(budget_m);
+                at = point;
+                track.used += 1;
+            } else {
+                gone_m = budget_m;
+                at += (point - at) * (left_m / length_m);
+            }
+            track.pieces += 1;
+            track.corners[track.pieces] = (gone_m, at);
+            if !arrives {
+                break;
+            }
+        }
+        track
+    }
+
+    /// This track, going on straight to `to` at the same speed; for one that is not full.
+    pub(crate) fn then(mut self, to: Vec2) -> Self {
+        if self.pieces < MAX_PIECES {
+            let (gone_m, at) = self.corners[self.pieces];
+            self.pieces += 1;
+            self.corners[self.pieces] = (gone_m + (to - at).norm(), to);
+        }
+        self
+    }
+
+    /// Where the tick ends.
+    pub(crate) const fn end(&self) -> Vec2 {
+        self.corners[self.pieces].1
+    }
+
+    /// Arc length moved in the tick, m.
+    pub(crate) const fn moved_m(&self) -> f64 {
+        self.corners[self.pieces].0
+    }
+
+    /// How many points of the path it walks are reached.
+    pub(crate) const fn used(&self) -> usize {
+        self.used
+    }
+
+    /// Whether it has as many pieces as fit.
+    pub(crate) const fn is_full(&self) -> bool {
+        self.pieces == MAX_PIECES
+    }
+
+    /// The corners with the arc length gone at each, the start included.
+    pub(crate) fn corners(&self) -> &[(f64, Vec2)] {
+        &self.corners[..=self.pieces]
+    }
+
+    /// The straight pieces: from, to, each with the arc length gone there.
+    pub(crate) fn pieces(&self) -> impl Iterator<Item = ((f64, Vec2), (f64, Vec2))> + '_ {
+        self.corners().windows(2).map(|pair| (pair[0], pair[1]))
+    }
+
+    /// Arc length of the first corner past `gone_m`; infinite past the last.
+    pub(crate) fn next_corner_m(&self, gone_m: f64) -> f64 {
+        let mut corners = self.corners().iter().map(|&(at_m, _)| at_m);
+        corners.find(|&at_m| at_m > gone_m).unwrap_or(f64::INFINITY)
+    }
+
+    /// Position when `gone_m` of the tick's arc length has passed; past its end it stands.
+    pub(crate) fn at(&self, gone_m: f64) -> Vec2 {
+        for ((from_m, from), (to_m, to)) in self.pieces() {
+            if gone_m < to_m {
+                let share = ((gone_m - from_m) / (to_m - from_m)).max(0.0);
+                return from + (to - from) * share;
+            }
+        }
+        self.end()
+    }
+}

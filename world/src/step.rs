@@ -1,0 +1,252 @@
+//! One tick of the world, from commands to hash: the one place where the order is written.
+//!
+//! Responsible for: the machine, its inputs, the order within a step. Not responsible for: any of
+//! the steps themselves.
+
+use scene::{Scene, Settings};
+use shm_types::{
+    Checked, Command, ConstraintTable, ControlRequest, EventKind, MotionBatch, Outcome,
+    PlannerReport, WorldSnapshot,
+};
+
+use crate::accounts::{self, ActivityTimes, WorldCounters};
+use crate::bars::Bars;
+use crate::bodies::Bodies;
+use crate::broad::Aabb;
+use crate::constraints::Constraints;
+use crate::epoch::Epoch;
+use crate::grants::{Grants, Surroundings};
+use crate::invariants::Violation;
+use crate::journal::{Event, Journal};
+use crate::motion::{self, Span};
+use crate::path::Track;
+use crate::state::{Object, Robot};
+
+/// What one step of the world takes in.
+#[derive(Clone, Copy)]
+pub struct WorldInput<'a> {
+    /// The newest command of each robot, by robot; `None` for one never heard of. A command seen
+    /// before does no harm.
+    pub commands: &'a [Option<Checked<'a, Command>>],
+    /// The planner's newest report.
+    pub planner: Option<Checked<'a, PlannerReport>>,
+    /// The newest constraint table published.
+    pub table: Option<Checked<'a, ConstraintTable>>,
+    /// Control requests since the last step, in the order of their arrival.
+    pub control: &'a [ControlRequest],
+}
+
+/// The world's step machine. After construction a step allocates nothing.
+pub struct World {
+    pub(crate) settings: Settings,
+    pub(crate) tick: u64,
+    /// World time of `tick`, ns.
+    pub(crate) time_ns: u64,
+    /// Arc length of one tick at full speed, m.
+    pub(crate) tick_m: f64,
+    pub(crate) robots: Vec<Robot>,
+    pub(crate) objects: Vec<Object>,
+    pub(crate) bodies: Bodies,
+    pub(crate) grants: Grants,
+    pub(crate) bars: Bars,
+    pub(crate) constraints: Constraints,
+    pub(crate) epoch: Epoch,
+    pub(crate) schedule_version: u32,
+    pub(crate) busy: u32,
+    pub(crate) held: bool,
+    pub(crate) stopped: bool,
+    pub(crate) overflowed: bool,
+    pub(crate) settled_ticks: u32,
+    pub(crate) outcome: Outcome,
+    pub(crate) violation: Option<Violation>,
+    pub(crate) counters: WorldCounters,
+    /// Boxes of the robots' motion in a tick: working memory of the invariants.
+    pub(crate) regions: Vec<Aabb>,
+    /// The snapshot as it will be published.
+    pub(crate) wire: Box<WorldSnapshot>,
+}
+
+impl World {
+    /// The initial state: robots at home and taking part, objects at their starts, epoch 1.
+    #[must_use]
+    pub fn new(scene: &Scene, settings: Settings, run_id: u64) -> Self {
+        let robots: Vec<Robot> = scene.homes.iter().map(|&h| Robot::at_home(h)).collect();
+        let objects: Vec<Object> = scene
+            .objects
+            .iter()
+            .map(|o| Object::at_start(o.start, o.goal))
+            .collect();
+        #[expect(clippy::cast_precision_loss, reason = "a tick is far below 2^53 ns")]
+        let tick_m = scene.robot.speed_m_per_s * (settings.tick_ns as f64 * 1e-9);
+        let mut wire: Box<WorldSnapshot> = shm_types::zeroed();
+        wire.header.run_id = run_id;
+        wire.header.scenario_hash = scene.hash;
+        wire.header.generation = 1;
+        let mut world = Self {
+            tick: 0,
+            time_ns: 0,
+            tick_m,
+            bodies: Bodies::new(scene),
+            grants: Grants::new(robots.len(), tick_m),
+            bars: Bars::new(robots.len(), objects.len()),
+            constraints: Constraints::none(),
+            epoch: Epoch::first(),
+            schedule_version: 0,
+            busy: 0,
+            held: false,
+            stopped: false,
+            overflowed: false,
+            settled_ticks: 0,
+            outcome: Outcome::Running,
+            violation: None,
+            counters: WorldCounters::default(),
+            regions: vec![Aabb::around(scene::Vec2::zeros(), scene::Vec2::zeros()); robots.len()],
+            settings,
+            robots,
+            objects,
+            wire,
+        };
+        world.write_wire();
+        world.chain(None);
+        world
+    }
+
+    /// Writes the present snapshot: every live field, unused grant points zero. Leaves
+    /// `publish_stamp_ns` to the transport.
+    pub fn snapshot_into(&self, out: &mut WorldSnapshot) {
+        out.header = self.wire.header;
+        let (robots, objects) = (self.robots.len(), self.objects.len());
+        out.robots[..robots].copy_from_slice(&self.wire.robots[..robots]);
+        out.objects[..objects].copy_from_slice(&self.wire.objects[..objects]);
+    }
+
+    /// Advances one tick, and writes all its motion and events to `motion`. Once the outcome is
+    /// no longer [`Outcome::Running`] nothing changes any more and the batch stays empty.
+    pub fn step(&mut self, scene: &Scene, input: WorldInput<'_>, motion: &mut MotionBatch) {
+        let mut journal = Journal::begin(motion, self.tick, self.time_ns);
+        if self.outcome != Outcome::Running {
+            journal.finish(self.tick, self.time_ns);
+            return;
+        }
+        if self.tick == 0 {
+            journal.event(Event::new(EventKind::Started));
+            journal.event(Event::new(EventKind::Epoch).value(self.epoch.number));
+        }
+        let planner = accounts::report(input.planner);
+        let published = input.table.map(Checked::get);
+        self.begin_tick();
+        self.take_control(input.control, &mut journal);
+        self.take_commands(scene, &input, published, &mut journal);
+        self.adopt_constraints(published, &mut journal);
+        self.count_failures(&mut journal);
+        self.act(scene, &mut journal);
+        self.lift_bars_of_parked();
+        self.open_epoch(&mut journal);
+        self.watch(scene, &mut journal);
+        self.busy = accounts::settle(&mut self.robots, planner, self.tick, self.held);
+        self.end_tick(scene, planner, &mut journal);
+        self.write_wire();
+        self.chain(Some(&input));
+    }
+
+    fn begin_tick(&mut self) {
+        for robot in &mut self.robots {
+            robot.moved = false;
+            robot.gripped = false;
+            robot.track = Track::still(robot.position);
+            robot.granted_m = 0.0;
+        }
+    }
+
+    /// Grips, grants and motion: all that takes world time.
+    fn act(&mut self, scene: &Scene, journal: &mut Journal<'_>) {
+        let (start_ns, tick_ns) = (self.time_ns, self.settings.tick_ns);
+        if !self.held {
+            self.begin_grips(scene, journal);
+            let around = Surroundings {
+                scene,
+                bodies: &self.bodies,
+            };
+            self.counters.grants_refused += self.grants.extend(around, &mut self.robots, self.tick);
+            let span = Span {
+                start_ns,
+                tick_ns,
+                tick_m: self.tick_m,
+            };
+            motion::advance(scene, &mut self.robots, &mut self.objects, span, journal);
+        }
+        journal.set_time(start_ns + tick_ns);
+        if !self.held {
+            self.advance_grips(scene, journal);
+        }
+    }
+
+    /// Checks the invariants; a broken one ends the run.
+    fn watch(&mut self, scene: &Scene, journal: &mut Journal<'_>) {
+        if let Some(violation) = self.find_violation(scene) {
+            self.counters.violations += 1;
+            self.violation = Some(violation);
+            journal.event(violation.event());
+        }
+        for robot in &mut self.robots {
+            let mut leaving = robot.leaving;
+            leaving.forget(|object| !self.bodies.is_around(scene, robot, object));
+            robot.leaving = leaving;
+        }
+        self.counters.swept_tests = self.bodies.tests();
+    }
+
+    fn end_tick(
+        &mut self,
+        scene: &Scene,
+        planner: Option<&PlannerReport>,
+        journal: &mut Journal<'_>,
+    ) {
+        let eventful = journal.is_eventful();
+        self.overflowed |= journal.overflowed();
+        self.schedule_version = planner.map_or(self.schedule_version, |p| p.schedule_version);
+        let outcome = self.judge_outcome(scene, planner, eventful);
+        self.epoch.change += u64::from(eventful);
+        self.tick += 1;
+        self.time_ns += self.settings.tick_ns;
+        self.outcome = outcome;
+        if outcome != Outcome::Running {
+            let event = Event::new(EventKind::Ended);
+            journal.event(event.value(u64::from(outcome.code())));
+        }
+        journal.finish(self.tick, self.time_ns);
+    }
+
+    /// How the run stands.
+    #[must_use]
+    pub const fn outcome(&self) -> Outcome {
+        self.outcome
+    }
+
+    /// What the world has counted so far.
+    #[must_use]
+    pub const fn counters(&self) -> &WorldCounters {
+        &self.counters
+    }
+
+    /// Ticks of `robot` by activity (rule 24); they sum up to the ticks so far.
+    ///
+    /// # Panics
+    /// When there is no such robot.
+    #[must_use]
+    pub fn times(&self, robot: usize) -> &ActivityTimes {
+        &self.robots[robot].times
+    }
+
+    /// The invariant that ended the run, if one did.
+    #[must_use]
+    pub const fn violation(&self) -> Option<Violation> {
+        self.violation
+    }
+
+    /// The hash of everybody's state at every tick so far, chained.
+    #[must_use]
+    pub const fn state_hash(&self) -> u64 {
+        self.wire.header.state_hash
+    }
+}
