@@ -15,7 +15,7 @@ use crate::intent::Intent;
 use crate::look::Blocker;
 use crate::now::Now;
 use crate::phase::{Next, Phase};
-use crate::select::Selecting;
+use crate::select::{self, Selecting};
 
 /// How long a question may stay unanswered before it is asked again, ns of virtual time.
 const ASK_AGAIN_NS: u64 = 5_000_000_000;
@@ -89,6 +89,10 @@ impl Failing {
     pub(crate) fn act(mut self, now: &Now<'_>, thinking: &Thinking, intent: &mut Intent) -> Next {
         let time_ns = now.time_ns();
         let settings = &thinking.settings;
+        if now.epoch() != intent.selected_epoch {
+            // The task is back in the pool (rule 18), and another robot's perhaps.
+            intent.claim = select::claim(now, None);
+        }
         match self.stage {
             Stage::Asked { since_ns, .. }
                 if is_answered(now, intent)

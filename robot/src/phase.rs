@@ -89,7 +89,7 @@ impl Phase {
             Self::Transit(trip) | Self::Transfer(trip) | Self::GoingHome(trip) => {
                 trip.hash_into(hash);
             }
-            Self::Grasping(grasping) => grasping.trip().hash_into(hash),
+            Self::Grasping(grasping) => grasping.hash_into(hash),
             Self::Failing(failing) => failing.hash_into(hash),
         }
     }

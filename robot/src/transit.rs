@@ -46,6 +46,6 @@ pub(crate) fn act(
                 Next::Rest(Phase::Transit(trip), Doing::waiting(u64::MAX))
             }
         }
-        Progress::Arrived => Next::Enter(Phase::Grasping(Grasping::new(trip))),
+        Progress::Arrived => Next::Enter(Phase::Grasping(Grasping::new(now, trip))),
     }
 }

@@ -1,0 +1,55 @@
+//! What is left of a run in process.
+//!
+//! Responsible for: gathering what the machines know at the end.
+//! Not responsible for: turning it into a result (the binary does).
+
+use shm_types::{Counters, Outcome};
+use world::{ActivityTimes, WorldCounters};
+
+/// One robot's account.
+#[derive(Clone, Copy, Debug)]
+pub struct RobotReport {
+    /// Ticks by activity; they sum up to the ticks of the run (rule 24).
+    pub times: ActivityTimes,
+    /// Work done.
+    pub counters: Counters,
+}
+
+/// How a run ended.
+#[derive(Clone, Debug)]
+pub struct SimReport {
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Why, where the outcome alone does not say.
+    pub reason: Option<String>,
+    /// Ticks made.
+    pub ticks: u64,
+    /// World time at the end, ns.
+    pub time_ns: u64,
+    /// Hash of everybody's state, chained over all ticks.
+    pub state_hash: u64,
+    /// What the world counted.
+    pub world: WorldCounters,
+    /// The robots.
+    pub robots: Vec<RobotReport>,
+    /// Work done by the planner service.
+    pub planner: Counters,
+    /// Hard constraints in force at the end.
+    pub hard_constraints: u32,
+}
+
+impl SimReport {
+    /// Work done by robots and planner together.
+    #[must_use]
+    pub fn counters(&self) -> Counters {
+        let robots = self.robots.iter().map(|robot| &robot.counters);
+        robots.fold(self.planner, |sum, one| Counters {
+            polygon_tests: sum.polygon_tests + one.polygon_tests,
+            path_plans: sum.path_plans + one.path_plans,
+            cells_expanded: sum.cells_expanded + one.cells_expanded,
+            selections: sum.selections + one.selections,
+            easy_constraints: sum.easy_constraints + one.easy_constraints,
+            units: sum.units + one.units,
+        })
+    }
+}

@@ -1,0 +1,239 @@
+//! The machines of one run, and their tick.
+//!
+//! Responsible for: stepping everyone in the fixed order, staging messages from tick to tick.
+//! Not responsible for: anything a machine decides.
+
+use std::ops::ControlFlow;
+
+use planner::{Planner, PlannerInput};
+use robot::{Robot, RobotInput};
+use scene::{Scene, Settings};
+use shm_types::capacity::MAX_ROBOTS;
+use shm_types::{
+    Checked, Command, ControlKind, ControlRequest, Counts, HardAnswer, HardRequest, Invalid,
+    MotionBatch, Outcome, PlannerReport, RoleKind, Validate, WorldSnapshot, zeroed,
+};
+use world::{FIRST_INCARNATION, World, WorldInput};
+
+use crate::report::{RobotReport, SimReport};
+use crate::tables::Tables;
+
+/// Watches a run: called after every tick with the snapshot it led to and the motion that led
+/// there. `Break` stops the run, as an interruption would.
+pub trait Observer {
+    /// A tick is over.
+    fn ticked(&mut self, snapshot: &WorldSnapshot, motion: &MotionBatch) -> ControlFlow<()>;
+}
+
+impl<F: FnMut(&WorldSnapshot, &MotionBatch) -> ControlFlow<()>> Observer for F {
+    fn ticked(&mut self, snapshot: &WorldSnapshot, motion: &MotionBatch) -> ControlFlow<()> {
+        self(snapshot, motion)
+    }
+}
+
+/// World, planner and robots of one run. After construction a tick allocates nothing.
+pub struct Simulation<'s> {
+    scene: &'s Scene,
+    settings: Settings,
+    world: World,
+    planner: Planner,
+    robots: Vec<Robot>,
+    snapshot: Box<WorldSnapshot>,
+    motion: Box<MotionBatch>,
+    /// The newest command of each robot.
+    commands: Vec<Command>,
+    /// The planner's newest report.
+    report: PlannerReport,
+    /// Requests stamped with the present tick, in robot order.
+    asked: Vec<HardRequest>,
+    /// Requests of the tick before: what the planner sees now.
+    staged: Vec<HardRequest>,
+    /// The planner's newest answer to each robot, as of the tick before.
+    answers: Vec<Option<HardAnswer>>,
+    /// What the planner has published.
+    tables: Tables,
+    /// What the world is told in the next step.
+    control: Vec<ControlRequest>,
+    control_id: u64,
+}
+
+impl<'s> Simulation<'s> {
+    /// A run of all the scene's robots, at tick 0. All memory it will ever use is allocated here.
+    #[must_use]
+    pub fn new(scene: &'s Scene, settings: &Settings, run_id: u64) -> Self {
+        let robots = scene.homes.len();
+        let world = World::new(scene, settings.clone(), run_id);
+        let mut snapshot = zeroed();
+        world.snapshot_into(&mut snapshot);
+        Self {
+            scene,
+            world,
+            planner: Planner::new(scene, settings.clone()),
+            robots: (0..robots)
+                .map(|id| Robot::new(scene, settings.clone(), id, FIRST_INCARNATION))
+                .collect(),
+            snapshot,
+            motion: zeroed(),
+            commands: vec![Command::default(); robots],
+            report: PlannerReport::default(),
+            asked: Vec::with_capacity(robots),
+            staged: Vec::with_capacity(robots),
+            answers: vec![None; robots],
+            tables: Tables::new(),
+            control: Vec::with_capacity(1),
+            control_id: 0,
+            settings: settings.clone(),
+        }
+    }
+
+    /// The newest snapshot.
+    #[must_use]
+    pub fn snapshot(&self) -> &WorldSnapshot {
+        &self.snapshot
+    }
+
+    /// Motion and events of the tick that led to it.
+    #[must_use]
+    pub fn motion(&self) -> &MotionBatch {
+        &self.motion
+    }
+
+    /// How the run stands.
+    #[must_use]
+    pub fn outcome(&self) -> Outcome {
+        self.world.outcome()
+    }
+
+    /// Ends the run with the next tick.
+    pub fn stop(&mut self) {
+        self.control_id += 1;
+        self.control.clear();
+        self.control.push(ControlRequest {
+            id: self.control_id,
+            kind: ControlKind::Stop.code(),
+            role: RoleKind::World.code(),
+            index: 0,
+            incarnation: FIRST_INCARNATION,
+        });
+    }
+
+    /// Runs until there is an outcome.
+    pub fn run(&mut self, observer: &mut dyn Observer) -> SimReport {
+        while self.outcome() == Outcome::Running {
+            self.tick();
+            if observer.ticked(&self.snapshot, &self.motion).is_break() {
+                self.stop();
+            }
+        }
+        self.report()
+    }
+
+    /// One tick: everyone steps on the present snapshot, the world makes the next one.
+    ///
+    /// # Panics
+    /// When a machine makes a message that is no valid one: that is a bug.
+    pub fn tick(&mut self) -> &WorldSnapshot {
+        let units = self.settings.units_per_tick(self.snapshot.header.busy);
+        self.step_robots(units);
+        self.step_planner(units);
+        self.step_world();
+        &self.snapshot
+    }
+
+    fn step_robots(&mut self, units: u64) {
+        let counts = self.scene.counts();
+        let snapshot = checked(&*self.snapshot, counts);
+        let version = snapshot.header.epoch_constraints_version;
+        let table = checked(self.tables.version(version), counts);
+        self.asked.clear();
+        for (id, robot) in self.robots.iter_mut().enumerate() {
+            let input = RobotInput {
+                snapshot,
+                table,
+                answer: self.answers[id],
+            };
+            let asked = robot.step(self.scene, input, units, &mut self.commands[id]);
+            self.asked.extend(asked);
+        }
+    }
+
+    fn step_planner(&mut self, units: u64) {
+        let input = PlannerInput {
+            snapshot: checked(&*self.snapshot, self.scene.counts()),
+            requests: &self.staged,
+        };
+        let output = self.planner.step(self.scene, input, units);
+        self.report = output.report;
+        for answer in output.answers {
+            self.answers[answer.robot as usize] = Some(*answer);
+        }
+        if let Some(table) = output.table {
+            self.tables.publish(table);
+        }
+        std::mem::swap(&mut self.asked, &mut self.staged);
+    }
+
+    fn step_world(&mut self) {
+        let counts = self.scene.counts();
+        let mut commands = [None; MAX_ROBOTS];
+        for (place, command) in commands.iter_mut().zip(&self.commands) {
+            *place = Some(checked(command, counts));
+        }
+        let input = WorldInput {
+            commands: &commands[..self.commands.len()],
+            planner: Some(checked(&self.report, counts)),
+            table: self.tables.newest().map(|table| checked(table, counts)),
+            control: &self.control,
+        };
+        self.world.step(self.scene, input, &mut self.motion);
+        self.control.clear();
+        self.world.snapshot_into(&mut self.snapshot);
+    }
+
+    /// What the machines know now.
+    #[must_use]
+    pub fn report(&self) -> SimReport {
+        let robots = self
+            .commands
+            .iter()
+            .enumerate()
+            .map(|(id, command)| RobotReport {
+                times: *self.world.times(id),
+                counters: command.counters,
+            });
+        SimReport {
+            outcome: self.outcome(),
+            reason: self.reason(),
+            ticks: self.snapshot.header.tick,
+            time_ns: self.snapshot.header.time_ns,
+            state_hash: self.world.state_hash(),
+            world: *self.world.counters(),
+            robots: robots.collect(),
+            planner: self.report.counters,
+            hard_constraints: self.tables.newest().map_or(0, |table| table.count),
+        }
+    }
+
+    fn reason(&self) -> Option<String> {
+        let stuck = self
+            .world
+            .stuck_reason(self.scene)
+            .map(|reason| reason.to_string());
+        stuck.or_else(|| {
+            self.world
+                .violation()
+                .map(|violation| format!("{violation:?}"))
+        })
+    }
+}
+
+/// A message made by a machine of this process.
+fn checked<T: Validate>(message: &T, counts: Counts) -> Checked<'_, T> {
+    Checked::new(message, counts).unwrap_or_else(|invalid| bug(invalid))
+}
+
+#[expect(clippy::panic, reason = "a machine of this process broke its contract")]
+#[cold]
+fn bug(invalid: Invalid) -> ! {
+    panic!("a machine made an invalid message: {invalid}")
+}
