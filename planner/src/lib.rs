@@ -16,12 +16,14 @@
 //! (rule 13).
 #![forbid(unsafe_code)]
 
+mod assignment;
 mod certificate;
 pub mod easy;
 mod field;
 mod frontier;
 mod joints;
 mod kind;
+mod lengths;
 mod meter;
 pub mod obstacles;
 mod places;
