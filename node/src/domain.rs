@@ -1,36 +1,431 @@
-//! Where a run lives.
+//! Where a run lives: a private directory with what all its processes start from.
+//!
+//! Responsible for: the directory, who owns it, its lock, `run.json`, the canonical scenario, the
+//! list of live runs, and that nothing of a run outlives it.
+//! Not responsible for: files in shared memory beyond their removal (`shared_memory`), or what the
+//! options mean.
+//!
+//! A run is *live* while its supervisor holds the lock of its directory; the kernel lets go of
+//! the lock when the supervisor dies, however it dies. Every start sweeps away what dead runs of
+//! this user have left.
 
-use std::path::PathBuf;
+use std::fs::{self, DirBuilder, File, OpenOptions};
+use std::io::{self, Read, Write};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
 
-use crate::options::Clock;
+use rustix::fs::{FlockOperation, flock};
+use serde::{Deserialize, Serialize};
+use shm_types::Counts;
+use shm_types::capacity::LAYOUT_VERSION;
 
-/// The directory of a run; dropping it removes it.
-#[derive(Debug)]
-pub struct RunDirectory(PathBuf);
+use crate::options::{Role, RunOptions};
+use crate::shared_memory;
 
-/// A live run, as `list` tells it.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct LiveRun {
-    /// Its id, in hexadecimal.
-    pub id: String,
-    /// Its name.
-    pub name: String,
-    /// Its directory.
-    pub directory: PathBuf,
-    /// Process id of its supervisor.
-    pub supervisor_pid: u32,
-    /// Name of its scenario.
-    pub scenario: String,
-    /// Robots that take part.
-    pub robots: u32,
-    /// Who sets the pace.
-    pub clock: Clock,
+/// Longest root and prefix together, bytes: event sockets fail beyond.
+pub const MAX_ROOT_AND_PREFIX: usize = 60;
+/// Digits of a run's id.
+const ID_DIGITS: usize = 8;
+/// Bytes of a run's directory and prefix past the directory of all runs: `/ID` and `rrID_`.
+const ROOT_AND_PREFIX_TAIL: usize = 1 + ID_DIGITS + 2 + ID_DIGITS + 1;
+
+const RUN_FILE: &str = "run.json";
+const SCENARIO_FILE: &str = "scenario.toml";
+const LOCK_FILE: &str = "lock";
+
+/// Why a run's place could not be made or found.
+#[derive(Debug, thiserror::Error)]
+pub enum DomainError {
+    /// A directory that is not this user's own.
+    #[error(
+        "{path} is not a private directory of this user ({reason}); remove it, or set \
+         XDG_RUNTIME_DIR to a directory of your own"
+    )]
+    NotPrivate {
+        /// Which.
+        path: PathBuf,
+        /// In what way.
+        reason: &'static str,
+    },
+    /// A run of this name is live.
+    #[error("a run named {name:?} is live (supervisor {pid}, in {path}); choose another --name")]
+    NameLive {
+        /// The name.
+        name: String,
+        /// Process id of its supervisor.
+        pid: u32,
+        /// Its directory.
+        path: PathBuf,
+    },
+    /// A name that cannot be told from an id, or is none.
+    #[error(
+        "{0:?} is no name for a run; a name has 1 to 64 letters, digits, '-', '_' or '.', and is \
+         not \"latest\""
+    )]
+    BadName(String),
+    /// The system refused.
+    #[error("could not use {path}: {source}")]
+    File {
+        /// Which file or directory.
+        path: PathBuf,
+        /// Why not.
+        source: io::Error,
+    },
+    /// A `run.json` of some other program or version.
+    #[error("{path} is no run of this version: {reason}")]
+    Foreign {
+        /// Which file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
 }
 
-/// Every live run of this user.
+/// `run.json`: what every process of the run starts from, and monitors find it by.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunFile {
+    /// Layout of the messages.
+    pub layout_version: u32,
+    /// Eight hexadecimal digits.
+    pub id: String,
+    /// Its name; the id if none was given.
+    pub name: String,
+    /// Prefix of its files in shared memory.
+    pub prefix: String,
+    /// Its directory, and the root of its iceoryx2 domain.
+    pub root: PathBuf,
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Hash of the canonical scenario.
+    pub scenario_hash: u64,
+    /// Robots.
+    pub robots: u32,
+    /// Objects.
+    pub objects: u32,
+    /// Bytes of shared memory that all segments can come to hold.
+    pub shared_memory_bytes: u64,
+    /// Process id of the supervisor.
+    pub supervisor_pid: u32,
+    /// The processes, once started.
+    pub processes: Vec<Process>,
+    /// What the run was asked to be.
+    pub options: RunOptions,
+}
+
+/// One process of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Process {
+    /// Which participant.
+    pub role: Role,
+    /// Its process id.
+    pub pid: u32,
+}
+
+impl RunFile {
+    /// Robots and objects.
+    #[must_use]
+    pub const fn counts(&self) -> Counts {
+        Counts {
+            robots: self.robots,
+            objects: self.objects,
+        }
+    }
+
+    /// Reads the run in a directory.
+    ///
+    /// # Errors
+    /// There is none of this version.
+    pub fn read(directory: &Path) -> Result<Self, DomainError> {
+        let path = directory.join(RUN_FILE);
+        let text = fs::read_to_string(&path).map_err(|e| file_error(&path, e))?;
+        let foreign = |reason: String| DomainError::Foreign {
+            path: path.clone(),
+            reason,
+        };
+        let run: Self = serde_json::from_str(&text).map_err(|e| foreign(e.to_string()))?;
+        if run.layout_version != LAYOUT_VERSION {
+            return Err(foreign(format!(
+                "its messages have layout {}, this program's {LAYOUT_VERSION}",
+                run.layout_version
+            )));
+        }
+        Ok(run)
+    }
+
+    /// The canonical scenario text of the run in a directory.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub fn read_scenario(directory: &Path) -> Result<String, DomainError> {
+        let path = directory.join(SCENARIO_FILE);
+        fs::read_to_string(&path).map_err(|e| file_error(&path, e))
+    }
+}
+
+/// The directory of a run of this process: live until it is dropped, then gone with all that the
+/// run has left in shared memory.
+#[derive(Debug)]
+pub struct RunDirectory {
+    path: PathBuf,
+    prefix: String,
+    _lock: File,
+}
+
+/// What a run's place is made from.
+pub(crate) struct NewRun<'a> {
+    pub(crate) name: Option<&'a str>,
+    pub(crate) scenario_text: &'a str,
+    pub(crate) scenario: &'a str,
+    pub(crate) scenario_hash: u64,
+    pub(crate) counts: Counts,
+    pub(crate) shared_memory_bytes: u64,
+    pub(crate) options: &'a RunOptions,
+}
+
+impl RunDirectory {
+    /// Makes a place for a run, after sweeping away dead ones.
+    ///
+    /// # Errors
+    /// The directory of runs is not private, the name is live, or the system refused.
+    pub(crate) fn create(new: &NewRun<'_>) -> Result<(Self, RunFile), DomainError> {
+        if let Some(name) = new.name {
+            check_name(name)?;
+        }
+        let runs = Runs::open()?;
+        if let Some(name) = new.name
+            && let Some(run) = runs.live()?.into_iter().find(|run| run.name == name)
+        {
+            return Err(DomainError::NameLive {
+                name: run.name,
+                pid: run.supervisor_pid,
+                path: run.root,
+            });
+        }
+        let (directory, id) = runs.make_directory()?;
+        let run = RunFile {
+            layout_version: LAYOUT_VERSION,
+            name: new.name.unwrap_or(&id).to_owned(),
+            prefix: directory.prefix.clone(),
+            root: directory.path.clone(),
+            id,
+            scenario: new.scenario.to_owned(),
+            scenario_hash: new.scenario_hash,
+            robots: new.counts.robots,
+            objects: new.counts.objects,
+            shared_memory_bytes: new.shared_memory_bytes,
+            supervisor_pid: std::process::id(),
+            processes: Vec::new(),
+            options: new.options.clone(),
+        };
+        directory.put(SCENARIO_FILE, new.scenario_text.as_bytes())?;
+        directory.write_run(&run)?;
+        Ok((directory, run))
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes `run.json`, at once or not at all.
+    ///
+    /// # Errors
+    /// The system refused.
+    pub(crate) fn write_run(&self, run: &RunFile) -> Result<(), DomainError> {
+        let path = self.path.join(RUN_FILE);
+        let text = serde_json::to_string_pretty(run).map_err(|e| file_error(&path, e.into()))?;
+        self.put(RUN_FILE, text.as_bytes())
+    }
+
+    /// Writes a private file, renamed into place.
+    fn put(&self, name: &str, bytes: &[u8]) -> Result<(), DomainError> {
+        let path = self.path.join(name);
+        let draft = self.path.join(format!("{name}.draft"));
+        let write = || {
+            let mut file = OpenOptions::new()
+                .write(true)
+                .create(true)
+                .truncate(true)
+                .mode(0o600)
+                .open(&draft)?;
+            file.write_all(bytes)?;
+            fs::rename(&draft, &path)
+        };
+        write().map_err(|e| file_error(&path, e))
+    }
+
+    /// Removes what the run has left in shared memory. Only once all its processes are dead.
+    ///
+    /// # Errors
+    /// The system refused.
+    pub(crate) fn clear_shared_memory(&self) -> Result<(), DomainError> {
+        shared_memory::remove_all(&self.prefix)
+            .map_err(|e| file_error(Path::new(shared_memory::SHARED_MEMORY), e))
+    }
+}
+
+impl Drop for RunDirectory {
+    fn drop(&mut self) {
+        if let Err(error) = self.clear_shared_memory() {
+            tracing::warn!("{error}");
+        }
+        if let Err(error) = fs::remove_dir_all(&self.path) {
+            tracing::warn!("could not remove {}: {error}", self.path.display());
+        }
+    }
+}
+
+/// Every live run of this user, by id. Sweeps away what dead ones have left.
 ///
 /// # Errors
-/// The directory of runs cannot be read or is not private.
-pub fn list() -> std::io::Result<Vec<LiveRun>> {
-    todo!()
+/// The directory of runs is not private, or the system refused.
+pub fn list() -> Result<Vec<RunFile>, DomainError> {
+    Runs::open()?.live()
+}
+
+/// The directory of all runs of this user, locked against other starts and lists.
+struct Runs {
+    path: PathBuf,
+    _lock: File,
+}
+
+impl Runs {
+    fn open() -> Result<Self, DomainError> {
+        let path = runs_path();
+        match DirBuilder::new().mode(0o700).create(&path) {
+            Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
+                return Err(file_error(&path, error));
+            }
+            _ => check_private(&path)?,
+        }
+        let lock = File::open(&path).map_err(|e| file_error(&path, e))?;
+        flock(&lock, FlockOperation::LockExclusive).map_err(|e| file_error(&path, e.into()))?;
+        Ok(Self { path, _lock: lock })
+    }
+
+    /// Reads live runs and removes dead ones. A directory is made and locked while the directory
+    /// of all runs is locked, so one without a lock has no supervisor.
+    fn live(&self) -> Result<Vec<RunFile>, DomainError> {
+        let mut runs = Vec::new();
+        let entries = fs::read_dir(&self.path).map_err(|e| file_error(&self.path, e))?;
+        for entry in entries {
+            let entry = entry.map_err(|e| file_error(&self.path, e))?;
+            let name = entry.file_name();
+            let Some(id) = name.to_str().filter(|name| is_id(name)) else {
+                continue;
+            };
+            let directory = entry.path();
+            if is_locked(&directory.join(LOCK_FILE)) {
+                runs.extend(RunFile::read(&directory).ok());
+                continue;
+            }
+            tracing::info!("removing what the dead run {id} has left");
+            shared_memory::remove_all(&prefix(id))
+                .map_err(|e| file_error(Path::new(shared_memory::SHARED_MEMORY), e))?;
+            fs::remove_dir_all(&directory).map_err(|e| file_error(&directory, e))?;
+        }
+        runs.sort_by(|a: &RunFile, b| a.id.cmp(&b.id));
+        Ok(runs)
+    }
+
+    fn make_directory(&self) -> Result<(RunDirectory, String), DomainError> {
+        loop {
+            let id = random_id().map_err(|e| file_error(Path::new("/dev/urandom"), e))?;
+            let path = self.path.join(&id);
+            match DirBuilder::new().mode(0o700).create(&path) {
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => continue,
+                other => other.map_err(|e| file_error(&path, e))?,
+            }
+            let lock_path = path.join(LOCK_FILE);
+            let lock = || -> io::Result<File> {
+                let lock = OpenOptions::new()
+                    .write(true)
+                    .create_new(true)
+                    .mode(0o600)
+                    .open(&lock_path)?;
+                flock(&lock, FlockOperation::NonBlockingLockExclusive)?;
+                Ok(lock)
+            };
+            let lock = lock().map_err(|e| file_error(&lock_path, e))?;
+            let directory = RunDirectory {
+                path,
+                prefix: prefix(&id),
+                _lock: lock,
+            };
+            return Ok((directory, id));
+        }
+    }
+}
+
+/// Where this user's runs lie: under `XDG_RUNTIME_DIR` if that is a directory with a short enough
+/// path, else under /tmp.
+fn runs_path() -> PathBuf {
+    let runtime = std::env::var_os("XDG_RUNTIME_DIR")
+        .map(PathBuf::from)
+        .filter(|path| path.is_absolute() && path.is_dir())
+        .map(|path| path.join("rearrange"))
+        .filter(|path| path.as_os_str().len() + ROOT_AND_PREFIX_TAIL <= MAX_ROOT_AND_PREFIX);
+    runtime.unwrap_or_else(|| {
+        let user = rustix::process::geteuid().as_raw();
+        PathBuf::from(format!("/tmp/rearrange-{user}"))
+    })
+}
+
+fn check_private(path: &Path) -> Result<(), DomainError> {
+    let found = fs::symlink_metadata(path).map_err(|e| file_error(path, e))?;
+    let reason = if !found.is_dir() {
+        "it is no directory"
+    } else if found.uid() != rustix::process::geteuid().as_raw() {
+        "somebody else owns it"
+    } else if found.mode() & 0o077 != 0 {
+        "others may enter it"
+    } else {
+        return Ok(());
+    };
+    Err(DomainError::NotPrivate {
+        path: path.to_owned(),
+        reason,
+    })
+}
+
+fn check_name(name: &str) -> Result<(), DomainError> {
+    let fine = (1..=64).contains(&name.len())
+        && name != "latest"
+        && !is_id(name)
+        && !name.starts_with('.')
+        && name
+            .bytes()
+            .all(|byte| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte));
+    if fine {
+        Ok(())
+    } else {
+        Err(DomainError::BadName(name.to_owned()))
+    }
+}
+
+fn is_id(name: &str) -> bool {
+    name.len() == ID_DIGITS && name.bytes().all(|byte| byte.is_ascii_hexdigit())
+}
+
+fn prefix(id: &str) -> String {
+    format!("rr{id}_")
+}
+
+fn random_id() -> io::Result<String> {
+    let mut bytes = [0; ID_DIGITS / 2];
+    File::open("/dev/urandom")?.read_exact(&mut bytes)?;
+    Ok(format!("{:08x}", u32::from_le_bytes(bytes)))
+}
+
+/// Whether another process, or another part of this one, holds the lock.
+fn is_locked(path: &Path) -> bool {
+    File::open(path).is_ok_and(|file| flock(&file, FlockOperation::NonBlockingLockShared).is_err())
+}
+
+fn file_error(path: &Path, source: io::Error) -> DomainError {
+    DomainError::File {
+        path: path.to_owned(),
+        source,
+    }
 }

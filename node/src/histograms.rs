@@ -13,8 +13,8 @@ use hdrhistogram::serialization::{Deserializer, Serializer, V2Serializer};
 
 /// Longest duration told apart, ns: a minute. Longer ones count as this.
 const HIGHEST_NS: u64 = 60_000_000_000;
-/// Significant decimal digits kept.
-const DIGITS: u8 = 3;
+/// Significant decimal digits kept: errors stay below 1 %.
+const DIGITS: u8 = 2;
 
 /// What is timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -93,4 +93,166 @@ pub struct LatencySummary {
 #[derive(Clone, Debug)]
 pub struct Latencies {
     histograms: Vec<Histogram<u64>>,
+}
+
+/// A file of latencies could not be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum LatencyFileError {
+    /// The system refused.
+    #[error(transparent)]
+    File(#[from] io::Error),
+    /// It holds something else.
+    #[error("the file holds no latencies of this version")]
+    Foreign,
+}
+
+impl Default for Latencies {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Latencies {
+    /// Empty histograms, with all their memory.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            histograms: Timed::ALL.map(|_| empty()).into(),
+        }
+    }
+
+    /// Records one duration. Makes no system call and allocates nothing.
+    pub fn record(&mut self, timed: Timed, duration_ns: u64) {
+        self.histograms[timed as usize].saturating_record(duration_ns);
+    }
+
+    /// Adds all that another process recorded.
+    pub fn merge(&mut self, other: &Self) {
+        for (mine, theirs) in self.histograms.iter_mut().zip(&other.histograms) {
+            // Equal bounds, so nothing of theirs can be out of range here.
+            let _ = mine.add(theirs);
+        }
+    }
+
+    /// The histogram of one name.
+    #[must_use]
+    pub fn histogram(&self, timed: Timed) -> &Histogram<u64> {
+        &self.histograms[timed as usize]
+    }
+
+    /// Every name under which something was recorded, with its summary.
+    pub fn summaries(&self) -> impl Iterator<Item = (Timed, LatencySummary)> {
+        Timed::ALL.into_iter().filter_map(|timed| {
+            let histogram = self.histogram(timed);
+            (!histogram.is_empty()).then(|| (timed, summary(histogram)))
+        })
+    }
+
+    /// Keeps them in a file: for each name the length of its histogram and the histogram, in
+    /// `HdrHistogram`'s V2 format.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), LatencyFileError> {
+        let mut bytes = Vec::new();
+        let mut one = Vec::new();
+        let mut serializer = V2Serializer::new();
+        for histogram in &self.histograms {
+            one.clear();
+            serializer
+                .serialize(histogram, &mut one)
+                .map_err(|_| LatencyFileError::Foreign)?;
+            bytes.extend_from_slice(&(one.len() as u64).to_le_bytes());
+            bytes.extend_from_slice(&one);
+        }
+        std::fs::write(path, bytes)?;
+        Ok(())
+    }
+
+    /// Reads what [`Self::write`] kept.
+    ///
+    /// # Errors
+    /// The file cannot be read, or holds something else.
+    pub fn read(path: &Path) -> Result<Self, LatencyFileError> {
+        let bytes = std::fs::read(path)?;
+        let mut rest = bytes.as_slice();
+        let mut histograms = Vec::new();
+        let mut deserializer = Deserializer::new();
+        for _ in Timed::ALL {
+            let (length, tail) = rest.split_first_chunk().ok_or(LatencyFileError::Foreign)?;
+            let length = usize::try_from(u64::from_le_bytes(*length))
+                .map_err(|_| LatencyFileError::Foreign)?;
+            let (mut one, tail) = tail
+                .split_at_checked(length)
+                .ok_or(LatencyFileError::Foreign)?;
+            histograms.push(
+                deserializer
+                    .deserialize(&mut one)
+                    .map_err(|_| LatencyFileError::Foreign)?,
+            );
+            rest = tail;
+        }
+        Ok(Self { histograms })
+    }
+}
+
+fn empty() -> Histogram<u64> {
+    #[expect(
+        clippy::expect_used,
+        reason = "the bounds are constants, and a test makes one"
+    )]
+    Histogram::new_with_bounds(1, HIGHEST_NS, DIGITS).expect("constant bounds are legal")
+}
+
+fn summary(histogram: &Histogram<u64>) -> LatencySummary {
+    LatencySummary {
+        count: histogram.len(),
+        p50_ns: histogram.value_at_quantile(0.5),
+        p99_ns: histogram.value_at_quantile(0.99),
+        p999_ns: histogram.value_at_quantile(0.999),
+        max_ns: histogram.max(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_kept_in_files_adds_up() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut sum = Latencies::new();
+        for process in 0..3_u64 {
+            let mut own = Latencies::new();
+            for i in 0..100 {
+                own.record(Timed::SnapshotAge, 1_000 + process * 100 + i);
+            }
+            own.record(Timed::HardRoundTrip, u64::MAX);
+            let path = directory.path().join(format!("{process}"));
+            own.write(&path).unwrap();
+            sum.merge(&Latencies::read(&path).unwrap());
+        }
+        let all: Vec<_> = sum.summaries().collect();
+        assert_eq!(all.len(), 2);
+        assert_eq!(all[0].0, Timed::SnapshotAge);
+        assert_eq!(all[0].1.count, 300);
+        assert!((1_100..=1_210).contains(&all[0].1.p50_ns));
+        assert!(
+            all[1].1.max_ns >= HIGHEST_NS,
+            "a long one counts as the longest"
+        );
+    }
+
+    #[test]
+    fn a_truncated_file_is_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("latencies");
+        Latencies::new().write(&path).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+        assert!(matches!(
+            Latencies::read(&path),
+            Err(LatencyFileError::Foreign)
+        ));
+    }
 }

@@ -5,12 +5,23 @@
 //! Not responsible for: what any machine decides (crates `world`, `planner`, `robot`), or what is
 //! printed (the binary).
 
+mod calls;
+mod children;
+mod clock;
 pub mod domain;
 pub mod histograms;
 pub mod options;
+mod ports;
+mod realtime;
 pub mod report;
 pub mod roles;
+pub mod shared_memory;
 pub mod supervisor;
+mod ticker;
+mod topics;
+mod wait;
+mod wakes;
+mod wire;
 
 pub use histograms::{Latencies, LatencySummary, Timed};
 pub use options::{Clock, Delay, Launcher, OptionError, Role, RunOptions, RunPlan, Wait};

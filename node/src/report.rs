@@ -39,7 +39,10 @@ pub struct RoleReport {
 
 /// [`Counters`], as they are kept in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[expect(missing_docs, reason = "each is the counter of its name in shm_types::Counters")]
+#[expect(
+    missing_docs,
+    reason = "each is the counter of its name in shm_types::Counters"
+)]
 pub struct WorkReport {
     pub polygon_tests: u64,
     pub path_plans: u64,

@@ -1,0 +1,150 @@
+//! The processes of a run, as the supervisor starts and ends them.
+//!
+//! Responsible for: starting a role so that it cannot outlive the supervisor or inherit anything
+//! of it, signals, reaping, and the last words of one that failed.
+//! Not responsible for: when (`supervisor`).
+
+use std::ffi::OsString;
+use std::fs::File;
+use std::io;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+
+use rustix::process::{Pid, Signal, kill_process};
+
+use crate::options::{Launcher, Role};
+
+/// Bytes of a failed role's log that are quoted.
+const LAST_WORDS: usize = 2_000;
+
+/// A started process.
+#[derive(Debug)]
+pub(crate) struct Participant {
+    pub(crate) role: Role,
+    process: Child,
+    ended: Option<ExitStatus>,
+    log: PathBuf,
+}
+
+/// The arguments of a role after the launcher's own: `ROLE --run DIR [--index N]`.
+pub(crate) fn arguments(role: Role, run_dir: &Path) -> Vec<OsString> {
+    let mut arguments: Vec<OsString> = vec![
+        role.subcommand().into(),
+        "--run".into(),
+        run_dir.as_os_str().into(),
+    ];
+    if let Role::Robot(index) = role {
+        arguments.extend(["--index".into(), index.to_string().into()]);
+    }
+    arguments
+}
+
+impl Participant {
+    /// Starts a role.
+    ///
+    /// # Errors
+    /// The system refused.
+    pub(crate) fn start(launcher: &Launcher, role: Role, run_dir: &Path) -> io::Result<Self> {
+        let log = run_dir.join(format!("{role}.log"));
+        let mut command = Command::new(&launcher.program);
+        command
+            .args(&launcher.before)
+            .args(arguments(role, run_dir))
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .process_group(0);
+        if !launcher.inherit_stderr {
+            command.stderr(File::create(&log)?);
+        }
+        let supervisor = rustix::process::getpid();
+        // SAFETY: between fork and exec the closure makes only async-signal-safe system calls, on
+        // integers, and allocates nothing.
+        unsafe { command.pre_exec(move || bind_to(supervisor)) };
+        Ok(Self {
+            role,
+            process: command.spawn()?,
+            ended: None,
+            log,
+        })
+    }
+
+    pub(crate) fn pid(&self) -> u32 {
+        self.process.id()
+    }
+
+    /// How it ended, if it has. Reaps it.
+    pub(crate) fn ended(&mut self) -> Option<ExitStatus> {
+        if self.ended.is_none() {
+            self.ended = self.process.try_wait().ok().flatten();
+        }
+        self.ended
+    }
+
+    /// Asks it to end.
+    pub(crate) fn terminate(&mut self) {
+        // Not reaped yet, so the process id is still its own.
+        if self.ended().is_none()
+            && let Some(pid) = i32::try_from(self.pid()).ok().and_then(Pid::from_raw)
+        {
+            let _ = kill_process(pid, Signal::TERM);
+        }
+    }
+
+    /// Ends it, and waits until it is gone. A stopped process ends too.
+    pub(crate) fn kill(&mut self) {
+        if self.ended().is_none() {
+            let _ = self.process.kill();
+            self.ended = self.process.wait().ok();
+        }
+    }
+
+    /// How it ended, with the end of its log: for people.
+    pub(crate) fn last_words(&self) -> String {
+        let how = self.ended.map_or_else(
+            || "is still running".to_owned(),
+            |status| status.to_string(),
+        );
+        let log = std::fs::read_to_string(&self.log).unwrap_or_default();
+        let log = log.trim_end();
+        let from = log.ceil_char_boundary(log.len().saturating_sub(LAST_WORDS));
+        if log.is_empty() {
+            format!("{} ended: {how}", self.role)
+        } else {
+            format!(
+                "{} ended: {how}; its last words: {}",
+                self.role,
+                &log[from..]
+            )
+        }
+    }
+}
+
+impl Drop for Participant {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+/// In the child, before it becomes the role: die with the supervisor, keep none of its
+/// descriptors (iceoryx2's are not close-on-exec).
+fn bind_to(supervisor: Pid) -> io::Result<()> {
+    rustix::process::set_parent_process_death_signal(Some(Signal::KILL))?;
+    if rustix::process::getppid() != Some(supervisor) {
+        return Err(io::ErrorKind::BrokenPipe.into());
+    }
+    // SAFETY: takes no pointers. Close-on-exec instead of closing keeps the descriptor through
+    // which std reports a failed exec.
+    let status = unsafe {
+        libc::close_range(
+            3,
+            libc::c_uint::MAX,
+            libc::CLOSE_RANGE_CLOEXEC.cast_signed(),
+        )
+    };
+    if status == 0 {
+        Ok(())
+    } else {
+        Err(io::Error::last_os_error())
+    }
+}

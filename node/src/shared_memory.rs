@@ -1,0 +1,220 @@
+//! What iceoryx2 leaves in /dev/shm, and what there is room for.
+//!
+//! Responsible for: the files of one run's prefix (their mode, the half-made ones, all of them),
+//! free shared memory, and the limit on descriptors.
+//! Not responsible for: how much a run needs (`topics`), or its directory (`domain`).
+//!
+//! Terms: a *half-made* file is one of no length, left by a process killed while it set up a
+//! connection; everybody who sets up afterwards waits for it to grow, without end.
+
+use std::fs;
+use std::io;
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+
+/// Where POSIX shared memory lies on Linux.
+pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
+/// Descriptors a process needs beside its connections.
+const BASE_DESCRIPTORS: u64 = 128;
+/// Descriptors each other participant costs the one with the most connections.
+const DESCRIPTORS_PER_PARTICIPANT: u64 = 16;
+
+/// Why a run has no room on this machine.
+#[derive(Debug, thiserror::Error)]
+pub enum ResourceError {
+    /// No shared memory at all.
+    #[error("{SHARED_MEMORY} cannot be used ({0}); mount a tmpfs there")]
+    Missing(io::Error),
+    /// Shared memory that cannot be written.
+    #[error("{SHARED_MEMORY} is read-only; mount it writable")]
+    ReadOnly,
+    /// Not enough shared memory.
+    #[error(
+        "this run can come to need {needed} bytes of shared memory, but {SHARED_MEMORY} has \
+         {free} free; enlarge it (mount -o remount,size=…, or docker --shm-size), or take fewer \
+         robots or --monitors"
+    )]
+    SharedMemory {
+        /// Bytes that all segments add up to.
+        needed: u64,
+        /// Bytes free.
+        free: u64,
+    },
+    /// Not enough file descriptors.
+    #[error(
+        "this run needs up to {needed} open files in one process, but the limit is {limit}; raise \
+         it (ulimit -Hn), or take fewer robots or --monitors"
+    )]
+    Descriptors {
+        /// Descriptors the process with the most connections needs.
+        needed: u64,
+        /// The hard limit.
+        limit: u64,
+    },
+}
+
+/// Compares what a run needs with what there is, and raises this process's soft limit on open
+/// files, which its children inherit, as far as needed.
+///
+/// # Errors
+/// There is too little; both numbers.
+pub(crate) fn reserve(bytes: u64, participants: u64) -> Result<(), ResourceError> {
+    let room = rustix::fs::statvfs(SHARED_MEMORY).map_err(|e| ResourceError::Missing(e.into()))?;
+    if room.f_flag.contains(rustix::fs::StatVfsMountFlags::RDONLY) {
+        return Err(ResourceError::ReadOnly);
+    }
+    let free = room.f_bavail * room.f_frsize;
+    if bytes > free {
+        return Err(ResourceError::SharedMemory {
+            needed: bytes,
+            free,
+        });
+    }
+    let needed = BASE_DESCRIPTORS + DESCRIPTORS_PER_PARTICIPANT * participants;
+    let limits = getrlimit(Resource::Nofile);
+    let (soft, hard) = (
+        limits.current.unwrap_or(u64::MAX),
+        limits.maximum.unwrap_or(u64::MAX),
+    );
+    if needed > hard {
+        return Err(ResourceError::Descriptors {
+            needed,
+            limit: hard,
+        });
+    }
+    if needed > soft {
+        let raised = Rlimit {
+            current: Some(needed),
+            maximum: limits.maximum,
+        };
+        setrlimit(Resource::Nofile, raised).map_err(|_| ResourceError::Descriptors {
+            needed,
+            limit: soft,
+        })?;
+    }
+    Ok(())
+}
+
+/// Takes the files that iceoryx2 opens to everybody away from everybody else. Called right after
+/// the first node of a run; later ones of the same user still join.
+///
+/// # Errors
+/// A file's mode cannot be changed.
+pub(crate) fn make_private(prefix: &str) -> io::Result<()> {
+    for_each_file(prefix, |path, file| {
+        if file.permissions().mode() & 0o077 == 0 {
+            return Ok(());
+        }
+        fs::set_permissions(path, fs::Permissions::from_mode(0o600))
+    })
+}
+
+/// Removes the half-made files of one prefix. Only once every process in set-up is dead.
+///
+/// # Errors
+/// A file cannot be removed.
+pub(crate) fn remove_half_made(prefix: &str) -> io::Result<u32> {
+    let mut removed = 0;
+    for_each_file(prefix, |path, file| {
+        if file.len() == 0 {
+            fs::remove_file(path)?;
+            removed += 1;
+        }
+        Ok(())
+    })?;
+    Ok(removed)
+}
+
+/// Removes all files of one prefix. Only once every process of the run is dead.
+///
+/// # Errors
+/// A file cannot be removed.
+pub(crate) fn remove_all(prefix: &str) -> io::Result<()> {
+    for_each_file(prefix, |path, _| fs::remove_file(path))
+}
+
+fn for_each_file(
+    prefix: &str,
+    mut visit: impl FnMut(&Path, &fs::Metadata) -> io::Result<()>,
+) -> io::Result<()> {
+    for entry in fs::read_dir(SHARED_MEMORY)? {
+        let entry = entry?;
+        if !entry
+            .file_name()
+            .as_encoded_bytes()
+            .starts_with(prefix.as_bytes())
+        {
+            continue;
+        }
+        // What somebody else has removed in the meantime is gone, as wanted.
+        match entry
+            .metadata()
+            .and_then(|file| visit(&entry.path(), &file))
+        {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            other => other?,
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A prefix of this test process, whose files are gone when it is dropped.
+    struct Scratch(String);
+
+    impl Scratch {
+        fn new(name: &str) -> Self {
+            Self(format!("rrtest{}{name}_", std::process::id()))
+        }
+
+        fn file(&self, name: &str, bytes: &[u8]) -> std::path::PathBuf {
+            let path = Path::new(SHARED_MEMORY).join(format!("{}{name}", self.0));
+            fs::write(&path, bytes).unwrap();
+            path
+        }
+    }
+
+    impl Drop for Scratch {
+        fn drop(&mut self) {
+            remove_all(&self.0).unwrap();
+        }
+    }
+
+    #[test]
+    fn only_half_made_files_of_the_own_prefix_go() {
+        let (own, other) = (Scratch::new("own"), Scratch::new("other"));
+        let half_made = own.file("1.connection", b"");
+        let whole = own.file("2.connection", b"x");
+        let foreign = other.file("1.connection", b"");
+        assert_eq!(remove_half_made(&own.0).unwrap(), 1);
+        assert!(!half_made.exists() && whole.exists() && foreign.exists());
+        remove_all(&own.0).unwrap();
+        assert!(!whole.exists() && foreign.exists());
+    }
+
+    #[test]
+    fn files_are_made_private() {
+        let own = Scratch::new("mode");
+        let path = own.file("1.global_mgmt", b"x");
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o666)).unwrap();
+        make_private(&own.0).unwrap();
+        assert_eq!(
+            fs::metadata(&path).unwrap().permissions().mode() & 0o777,
+            0o600
+        );
+    }
+
+    #[test]
+    fn a_refusal_names_both_numbers() {
+        let error = reserve(u64::MAX, 1).unwrap_err().to_string();
+        assert!(error.contains(&u64::MAX.to_string()), "{error}");
+        assert!(error.contains("free"), "{error}");
+        let error = reserve(0, u64::from(u32::MAX)).unwrap_err().to_string();
+        assert!(error.contains("open files"), "{error}");
+    }
+}
