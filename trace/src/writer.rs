@@ -1,0 +1,311 @@
+//! Writing a trace while the run goes on.
+//!
+//! Responsible for: what is written when, joining pieces of motion, ending chunks so that a file
+//! cut short still reads, noticing lost batches.
+//! Not responsible for: clocks (the caller says when a second has passed, by [`Writer::flush`])
+//! or the words themselves (`record`).
+//!
+//! A chunk is built in memory and written whole. Each ends with a mark, before which every piece
+//! of motion so far has been written: up to the last whole chunk nothing is missing.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+
+use mcap::records::MessageHeader;
+use mcap::write::NoSeek;
+use shm_types::{Checked, Counts, Invalid, MotionBatch, WorldSnapshot};
+
+use crate::channel::{Channel, ENCODING, PROFILE, SCHEMA_ENCODING};
+use crate::merge::Pending;
+use crate::record::{BodyKind, End, Gap, Mark, Motion, Outcome, SceneRecord};
+use crate::wire;
+
+/// A chunk is ended once it holds this many bytes, whether or not the caller flushes.
+const CHUNK_BYTES: usize = 1 << 20;
+
+/// Why a trace could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// The file could not be written.
+    #[error("could not write the trace: {0}; is the disk full?")]
+    File(#[from] mcap::McapError),
+    /// A record has no JSON form.
+    #[error("could not write a {channel} record as JSON: {source}")]
+    Json {
+        /// Channel of the record.
+        channel: &'static str,
+        /// What is wrong.
+        source: serde_json::Error,
+    },
+    /// A batch is not a legal message.
+    #[error("could not write a batch of motion: {0}")]
+    Batch(#[from] Invalid),
+}
+
+/// How a run ended: what the caller knows and the writer does not.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ending {
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Why, where there is more to say.
+    pub reason: Option<String>,
+    /// When, ns of virtual time.
+    pub makespan_ns: u64,
+    /// All options of the command that ran it.
+    pub options: serde_json::Value,
+}
+
+/// Writes one trace.
+///
+/// Give it every batch in order, and snapshots as often as they come: it keeps those that are
+/// due. Call [`Writer::flush`] at least once a second of wall time, and [`Writer::finish`] at the
+/// end.
+pub struct Writer<W: Write> {
+    file: mcap::Writer<NoSeek<W>>,
+    counts: Counts,
+    state_every_ns: u64,
+    state_due_ns: u64,
+    /// A gap was found; the next snapshot from this tick on is written, due or not.
+    resync_from: Option<u64>,
+    next_sequence: u64,
+    missing: u64,
+    last: Mark,
+    marked: Option<Mark>,
+    robots: Vec<Option<Pending>>,
+    objects: Vec<Option<Pending>>,
+    channels: BTreeMap<&'static str, (u16, u32)>,
+    json: Vec<u8>,
+    chunk_bytes: usize,
+}
+
+impl<W: Write> Writer<W> {
+    /// Starts a trace with its scene. Snapshots are kept every `state_every_ns` of virtual time;
+    /// with 0, every one.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn new(out: W, scene: &SceneRecord, state_every_ns: u64) -> Result<Self, WriteError> {
+        let file = mcap::WriteOptions::new()
+            .compression(None)
+            .profile(PROFILE)
+            .library(concat!("rearrange ", env!("CARGO_PKG_VERSION")))
+            .chunk_size(None)
+            .disable_seeking(true)
+            .create(NoSeek::new(out))?;
+        let mut writer = Self {
+            file,
+            counts: Counts {
+                robots: u32::try_from(scene.homes.len()).unwrap_or(u32::MAX),
+                objects: u32::try_from(scene.objects.len()).unwrap_or(u32::MAX),
+            },
+            state_every_ns,
+            state_due_ns: 0,
+            resync_from: None,
+            next_sequence: 0,
+            missing: 0,
+            last: Mark {
+                tick: 0,
+                time_ns: 0,
+            },
+            marked: None,
+            robots: scene.homes.iter().map(|_| None).collect(),
+            objects: scene.objects.iter().map(|_| None).collect(),
+            channels: BTreeMap::new(),
+            json: Vec::new(),
+            chunk_bytes: 0,
+        };
+        for channel in Channel::ALL {
+            writer.open(channel)?;
+        }
+        writer.write(Channel::Scene, 0, scene)?;
+        writer.flush()?;
+        Ok(writer)
+    }
+
+    fn open(&mut self, channel: Channel) -> Result<(), WriteError> {
+        let (name, schema) = channel.schema();
+        let topic = channel.topic();
+        let schema = serde_json::to_vec(&schema).map_err(|source| WriteError::Json {
+            channel: topic,
+            source,
+        })?;
+        let schema = self.file.add_schema(&name, SCHEMA_ENCODING, &schema)?;
+        let id = self
+            .file
+            .add_channel(schema, topic, ENCODING, &BTreeMap::new())?;
+        self.channels.insert(topic, (id, 0));
+        Ok(())
+    }
+
+    fn write<T: serde::Serialize>(
+        &mut self,
+        channel: Channel,
+        time_ns: u64,
+        record: &T,
+    ) -> Result<(), WriteError> {
+        let topic = channel.topic();
+        self.json.clear();
+        serde_json::to_writer(&mut self.json, record).map_err(|source| WriteError::Json {
+            channel: topic,
+            source,
+        })?;
+        let (id, sequence) = self.channels.entry(topic).or_default();
+        let header = MessageHeader {
+            channel_id: *id,
+            sequence: *sequence,
+            log_time: time_ns,
+            publish_time: time_ns,
+        };
+        *sequence = sequence.wrapping_add(1);
+        self.chunk_bytes += self.json.len();
+        Ok(self.file.write_to_known_channel(&header, &self.json)?)
+    }
+
+    /// Adds the motion and events of one tick. A batch that comes again is ignored; when batches
+    /// are missing before this one, the trace says so and is incomplete.
+    ///
+    /// # Errors
+    /// The batch is not legal, or the file cannot be written.
+    pub fn batch(&mut self, batch: &MotionBatch) -> Result<(), WriteError> {
+        let batch = Checked::new(batch, self.counts)?;
+        if batch.sequence < self.next_sequence {
+            return Ok(());
+        }
+        if batch.sequence > self.next_sequence {
+            self.gap(batch.tick, batch.sequence - self.next_sequence)?;
+        }
+        for record in batch.motions() {
+            self.motion(&wire::motion(record)?)?;
+        }
+        for record in batch.events() {
+            let event = wire::event(batch.tick, record)?;
+            self.write(Channel::Event, event.time_ns, &event)?;
+        }
+        self.next_sequence = batch.sequence + 1;
+        self.last = Mark {
+            tick: batch.tick,
+            time_ns: batch.time_ns,
+        };
+        self.end_full_chunk()
+    }
+
+    fn gap(&mut self, before_tick: u64, batches: u64) -> Result<(), WriteError> {
+        self.mark()?;
+        let gap = Gap {
+            after_tick: self.last.tick,
+            before_tick,
+            batches,
+        };
+        self.write(Channel::Gap, self.last.time_ns, &gap)?;
+        self.missing += batches;
+        self.resync_from = Some(before_tick.saturating_sub(1));
+        Ok(())
+    }
+
+    fn motion(&mut self, motion: &Motion) -> Result<(), WriteError> {
+        let bodies = match motion.body {
+            BodyKind::Robot => &mut self.robots,
+            BodyKind::Object => &mut self.objects,
+        };
+        let slot = &mut bodies[motion.id];
+        if slot.as_mut().is_some_and(|pending| pending.extend(motion)) {
+            return Ok(());
+        }
+        match slot.replace(Pending::new(*motion)) {
+            Some(pending) => self.write_motion(&pending.into_motion()),
+            None => Ok(()),
+        }
+    }
+
+    fn write_motion(&mut self, motion: &Motion) -> Result<(), WriteError> {
+        self.write(Channel::Motion, motion.start_ns, motion)
+    }
+
+    /// Offers a snapshot. It is written if it is due and the batch that led to it has been given:
+    /// one that runs ahead of the batches is left out.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn snapshot(&mut self, snapshot: Checked<'_, WorldSnapshot>) -> Result<(), WriteError> {
+        let header = &snapshot.header;
+        let after_mark = self.marked.is_none_or(|mark| header.tick >= mark.tick);
+        if header.tick > self.last.tick || !after_mark {
+            return Ok(());
+        }
+        let due = match self.resync_from {
+            Some(tick) => header.tick >= tick,
+            None => header.time_ns >= self.state_due_ns,
+        };
+        if !due {
+            return Ok(());
+        }
+        self.resync_from = None;
+        let state = wire::state(snapshot)?;
+        self.write(Channel::State, state.time_ns, &state)?;
+        let every = self.state_every_ns.max(1);
+        self.state_due_ns = (state.time_ns / every + 1).saturating_mul(every);
+        self.end_full_chunk()
+    }
+
+    /// Writes out all that is known so far and ends the chunk: a file cut short after this reads
+    /// up to here.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn flush(&mut self) -> Result<(), WriteError> {
+        self.mark()?;
+        self.chunk_bytes = 0;
+        Ok(self.file.flush()?)
+    }
+
+    fn end_full_chunk(&mut self) -> Result<(), WriteError> {
+        if self.chunk_bytes >= CHUNK_BYTES {
+            self.flush()?;
+        }
+        Ok(())
+    }
+
+    /// Writes all pending motion, and a mark if anything is new since the last.
+    fn mark(&mut self) -> Result<(), WriteError> {
+        for id in 0..self.robots.len() {
+            if let Some(pending) = self.robots[id].take() {
+                self.write_motion(&pending.into_motion())?;
+            }
+        }
+        for id in 0..self.objects.len() {
+            if let Some(pending) = self.objects[id].take() {
+                self.write_motion(&pending.into_motion())?;
+            }
+        }
+        if self.marked != Some(self.last) {
+            self.marked = Some(self.last);
+            let mark = self.last;
+            self.write(Channel::Mark, mark.time_ns, &mark)?;
+        }
+        Ok(())
+    }
+
+    /// How many batches were lost so far: with any, the trace is incomplete.
+    #[must_use]
+    pub const fn missing_batches(&self) -> u64 {
+        self.missing
+    }
+
+    /// Ends the trace and gives back what it was written to.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn finish(mut self, ending: Ending) -> Result<W, WriteError> {
+        self.mark()?;
+        let end = End {
+            outcome: ending.outcome,
+            reason: ending.reason,
+            makespan_ns: ending.makespan_ns,
+            complete: self.missing == 0,
+            options: ending.options,
+        };
+        self.write(Channel::End, self.last.time_ns, &end)?;
+        self.file.finish()?;
+        Ok(self.file.into_inner().into_inner())
+    }
+}
