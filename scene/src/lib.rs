@@ -17,6 +17,8 @@ pub mod draft;
 mod file;
 pub mod geometry;
 pub mod lattice;
+mod orders;
+mod overlaps;
 pub mod problem;
 mod raster;
 pub mod reach;
@@ -25,7 +27,7 @@ pub mod scene;
 pub mod schema;
 pub mod settings;
 pub mod shape;
-mod validate;
+pub mod validate;
 pub mod work;
 
 pub use body::{Body, ClassId, Part, ROBOT_ALONE};

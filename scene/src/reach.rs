@@ -81,8 +81,8 @@ impl fmt::Display for Infeasible {
                 };
                 f.write_str("in a ring, each object ")?;
                 write!(f, "{what} the next: ")?;
-                for object in objects.iter().chain(objects.first()) {
-                    if Some(object) != objects.first() {
+                for (i, object) in objects.iter().chain(objects.first()).enumerate() {
+                    if i > 0 {
                         f.write_str(" → ")?;
                     }
                     write!(f, "{object}")?;

@@ -84,12 +84,8 @@ impl Report<'_> {
     fn malformed(&self, error: &toml::de::Error) -> ScenarioError {
         let span = error.span().unwrap_or(0..0);
         let labels = vec![label("here", &span)];
-        self.error(vec![self.located(
-            &span,
-            error.message().to_owned(),
-            labels,
-            None,
-        )])
+        let what = in_plain_words(error);
+        self.error(vec![self.located(&span, what, labels, None)])
     }
 
     fn problems(&self, file: &ScenarioFile, problems: &[Problem]) -> ScenarioError {
@@ -136,6 +132,29 @@ impl Report<'_> {
             file: self.file.to_owned(),
             problems,
         }
+    }
+}
+
+/// The message of the TOML reader, with the key it is about.
+fn in_plain_words(error: &toml::de::Error) -> String {
+    let message = error
+        .message()
+        .replace("unknown field", "unknown key")
+        .replace("missing field", "missing key")
+        .replace("duplicate field", "duplicate key")
+        .replace("unknown variant", "unknown kind")
+        .replace("invalid type: floating point", "invalid type: number");
+    // Without the text at hand the reader's own display names the key, as "in `robot.speed`".
+    let mut bare = error.clone();
+    bare.set_input(None);
+    let display = bare.to_string();
+    let key = display
+        .lines()
+        .last()
+        .and_then(|line| line.strip_prefix("in `")?.strip_suffix('`'));
+    match key {
+        Some(key) => format!("{key}: {message}"),
+        None => message,
     }
 }
 

@@ -1,0 +1,135 @@
+//! The configuration space against direct exact tests, and the lattice's choice.
+
+use proptest::prelude::*;
+use scene::{
+    ClassId, Connectivity, Draft, ObjectDraft, Occupancy, Scene, ShapeDraft, Vec2, WallDraft,
+};
+
+use crate::geometry::shape;
+
+/// Directions in the order of [`Occupancy::steps`].
+const STEPS: [(i32, i32); 8] = [
+    (1, 0),
+    (0, 1),
+    (-1, 0),
+    (0, -1),
+    (1, 1),
+    (-1, 1),
+    (-1, -1),
+    (1, -1),
+];
+
+fn robot_shape() -> impl Strategy<Value = ShapeDraft> {
+    prop_oneof![
+        3 => (2..12i32, 2..12i32).prop_map(|(x, y)| ShapeDraft::Box([f64::from(x) * 0.05, f64::from(y) * 0.05])),
+        1 => (0.1..0.3f64).prop_map(ShapeDraft::Circle),
+        1 => (0.1..0.3f64).prop_map(|r| ShapeDraft::Polygon(vec![[r, 0.0], [0.0, 2.0 * r], [-r, 0.0], [0.0, -r]])),
+    ]
+}
+
+fn coordinate(low: i32, high: i32) -> impl Strategy<Value = f64> {
+    (low..high).prop_map(|i| f64::from(i) * 0.05)
+}
+
+fn wall() -> impl Strategy<Value = WallDraft> {
+    let corner = || (coordinate(0, 80), coordinate(0, 50));
+    prop_oneof![
+        3 => (corner(), coordinate(1, 20), coordinate(1, 20))
+            .prop_map(|((x, y), w, h)| WallDraft::Box([x, y, x + w, y + h])),
+        1 => (corner(), 0.1..0.8f64, 0.1..0.8f64)
+            .prop_map(|((x, y), w, h)| WallDraft::Polygon(vec![[x, y], [x + w, y + h / 2.0], [x + w / 2.0, y + h]])),
+    ]
+}
+
+/// A room with random walls; one robot in a bay of its own, where it is never blocked.
+fn scene() -> impl Strategy<Value = Scene> {
+    (
+        robot_shape(),
+        prop::collection::vec(wall(), 0..5),
+        prop_oneof![Just(0.0), Just(0.05), 0.0..0.1f64],
+        prop_oneof![Just(Connectivity::Four), Just(Connectivity::Eight)],
+    )
+        .prop_filter_map("not a scene", |(shape, walls, clearance, connectivity)| {
+            let mut draft = Draft::room("random", [0.0, 0.0, 6.0, 3.0]);
+            draft.robot.shape = shape;
+            draft.robot.clearance_m = clearance;
+            draft.connectivity = connectivity;
+            draft.walls = walls;
+            draft.homes = vec![[5.4, 0.9]];
+            draft.objects = vec![ObjectDraft {
+                shape: ShapeDraft::Box([0.3, 0.2]),
+                grasp: [0.1, -0.45],
+                ..ObjectDraft::paper([5.4, 2.4], None)
+            }];
+            Scene::new(draft).ok()
+        })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    #[test]
+    fn every_point_and_step_is_what_the_exact_test_says(
+        scene in scene(),
+        class in 0..2usize,
+        obstacles in prop::collection::vec((shape(), 0.0..6.0f64, 0.0..3.0f64, -0.5..0.5f64, -0.5..0.5f64, any::<bool>()), 0..4),
+        cells in prop::collection::vec(any::<prop::sample::Index>(), 60),
+    ) {
+        let lattice = &scene.lattice;
+        let mut space = Occupancy::new(&scene);
+        space.reset(&scene, ClassId(class));
+        for (shape, x, y, along_x, along_y, moves) in &obstacles {
+            let at = Vec2::new(*x, *y);
+            if *moves {
+                space.block_swept(&scene, shape, at, at + Vec2::new(*along_x, *along_y));
+            } else {
+                space.block(&scene, shape, at, *along_x > 0.0);
+            }
+        }
+        let inside = |column: i32, row: i32| {
+            (0..lattice.width as i32).contains(&column) && (0..lattice.height as i32).contains(&row)
+        };
+        for index in cells {
+            let cell = index.index(lattice.len()) as u32;
+            let (column, row) = ((cell % lattice.width) as i32, (cell / lattice.width) as i32);
+            let at = lattice.at(cell);
+            prop_assert_eq!(space.is_free(cell), space.at_is_free(&scene, at));
+            let straight = |from: (i32, i32), to: (i32, i32)| {
+                inside(from.0, from.1) && inside(to.0, to.1) && {
+                    let point = |(c, r): (i32, i32)| lattice.at((r * lattice.width as i32 + c) as u32);
+                    space.straight_is_free(&scene, point(from), point(to))
+                }
+            };
+            let mut visited = Vec::new();
+            space.for_each_step(cell, |next, length| visited.push((next, length)));
+            for (direction, (x, y)) in STEPS.into_iter().enumerate() {
+                let to = (column + x, row + y);
+                let mut free = straight((column, row), to);
+                if x != 0 && y != 0 {
+                    free = free && lattice.connectivity == Connectivity::Eight
+                        && straight((column, row), (to.0, row)) && straight((to.0, row), to)
+                        && straight((column, row), (column, to.1)) && straight((column, to.1), to);
+                }
+                prop_assert_eq!(space.steps(cell) >> direction & 1 == 1, free, "cell {} direction {}", cell, direction);
+                let next = (to.1 * lattice.width as i32 + to.0) as u32;
+                let length = f64::from(x * x + y * y).sqrt() * lattice.pitch_m;
+                let found = visited.iter().any(|(n, l)| *n == next && (l - length).abs() < 1e-12);
+                prop_assert_eq!(found, free);
+            }
+        }
+    }
+
+    #[test]
+    fn resetting_forgets_every_obstacle(scene in scene(), obstacle in shape(), x in 0.0..6.0f64, y in 0.0..3.0f64) {
+        let fresh = Occupancy::new(&scene);
+        let mut used = fresh.clone();
+        used.block(&scene, &obstacle, Vec2::new(x, y), true);
+        used.reset(&scene, ClassId(1));
+        used.reset(&scene, ClassId(0));
+        for cell in 0..scene.lattice.len() as u32 {
+            prop_assert_eq!(used.steps(cell), fresh.steps(cell));
+            prop_assert_eq!(used.is_free(cell), fresh.is_free(cell));
+        }
+        prop_assert!(used.at_is_free(&scene, scene.homes[0]));
+    }
+}

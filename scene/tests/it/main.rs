@@ -1,0 +1,4 @@
+//! Property and message tests of the domain, against its public interface alone.
+
+mod cspace;
+mod geometry;
