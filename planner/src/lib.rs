@@ -19,22 +19,26 @@
 mod assignment;
 mod certificate;
 pub mod easy;
+mod feasibility;
 mod field;
 mod frontier;
+mod hard;
 mod joints;
 mod kind;
 mod lengths;
 mod meter;
 pub mod obstacles;
+mod pairs;
 mod places;
 mod priority;
 mod search;
 mod selection;
 mod service;
 
-pub use certificate::{Infeasible, certificate};
+pub use certificate::certificate;
 pub use easy::EasyConstraints;
 pub use field::DistanceField;
+pub use hard::{Found, HardConstraints};
 pub use kind::Kind;
 pub use obstacles::{Robots, WorldView};
 pub use places::Places;

@@ -64,6 +64,11 @@ impl PlaceBook {
         }
     }
 
+    /// Number of tasks, open or not.
+    pub(crate) fn len(&self) -> usize {
+        self.places.len()
+    }
+
     /// Places of an open task.
     pub(crate) fn get(&self, task: usize) -> Option<Places> {
         self.places[task]

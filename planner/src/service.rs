@@ -1,8 +1,28 @@
-//! The planner service's step machine.
-use scene::{Scene, Settings};
-use shm_types::{Checked, ConstraintTable, HardAnswer, HardRequest, PlannerReport, WorldSnapshot};
+//! The planner service's step machine: hard constraints on request, or all of them at every
+//! event.
+//!
+//! Responsible for: the queue of requests, when which tests are made (the table before rule 23),
+//! versions of the constraint table, answers.
+//! Not responsible for: the tests (`hard`), how messages travel (crate `node`).
+//!
+//! A request is known by its robot, incarnation and failure id: asked again while it waits or is
+//! worked on, it is taken once; asked again after that, it gets the same answer once more, at
+//! no cost.
+
+use std::task::Poll;
+
+use scene::{Budget, Method, Scene, Settings};
+use shm_types::capacity::MAX_CONSTRAINTS;
+use shm_types::{
+    Checked, ConstraintTable, Counters, HardAnswer, HardRequest, PlannerReport, StateHash,
+    WorldSnapshot, zeroed,
+};
+
+use crate::hard::{Found, HardConstraints};
+use crate::places::Places;
 
 /// What one step of the planner is given.
+#[derive(Clone, Copy)]
 pub struct PlannerInput<'a> {
     /// Snapshot of this tick.
     pub snapshot: Checked<'a, WorldSnapshot>,
@@ -12,7 +32,7 @@ pub struct PlannerInput<'a> {
 
 /// What one step of the planner gives.
 pub struct PlannerOutput<'a> {
-    /// Its report to the world.
+    /// Its report to the world. Its incarnation is left to the shell.
     pub report: PlannerReport,
     /// Answers, to be seen in the next tick.
     pub answers: &'a [HardAnswer],
@@ -20,19 +40,273 @@ pub struct PlannerOutput<'a> {
     pub table: Option<&'a ConstraintTable>,
 }
 
-/// The planner.
-#[derive(Debug)]
-pub struct Planner;
+/// What is being worked on.
+#[derive(Clone, Copy, Debug)]
+enum Job {
+    /// The pairs of a failed task.
+    Task(HardRequest),
+    /// All pairs, for the snapshot with this number of events.
+    All { events: u64 },
+}
+
+/// The planner service.
+pub struct Planner {
+    method: Method,
+    tasks: usize,
+    hard: HardConstraints,
+    /// Requests that wait, oldest first, at most one a robot.
+    queue: Vec<HardRequest>,
+    job: Option<Job>,
+    /// The newest answer to each robot.
+    answered: Vec<Option<HardAnswer>>,
+    /// Answers of this step.
+    answers: Vec<HardAnswer>,
+    table: Box<ConstraintTable>,
+    /// Constraints it has no room for.
+    dropped: u32,
+    counters: Counters,
+    /// Everything decided so far, in order.
+    journal: StateHash,
+}
 
 impl Planner {
-    /// A planner with nothing to do yet.
+    /// A planner with nothing to do yet; all memory it will ever use is allocated here.
     #[must_use]
-    pub fn new(_scene: &Scene, _settings: Settings) -> Self {
-        todo!()
+    pub fn new(scene: &Scene, settings: Settings) -> Self {
+        let (robots, tasks) = (scene.homes.len(), scene.objects.len());
+        let mut table = zeroed::<ConstraintTable>();
+        table.complete_for_events = u64::MAX;
+        Self {
+            method: settings.method,
+            tasks,
+            hard: HardConstraints::new(scene, &settings),
+            queue: Vec::with_capacity(robots),
+            job: None,
+            answered: vec![None; robots],
+            // The old answer again, that of a job for the robot's last life, and the new one.
+            answers: Vec::with_capacity(3 * robots),
+            table,
+            dropped: 0,
+            counters: Counters::default(),
+            journal: StateHash::new(),
+        }
     }
 
-    /// One step with `units` of work.
-    pub fn step(&mut self, _scene: &Scene, _input: PlannerInput, _units: u64) -> PlannerOutput<'_> {
-        todo!()
+    /// One step: takes in the requests, then works for at most `units`.
+    pub fn step(&mut self, scene: &Scene, input: PlannerInput, units: u64) -> PlannerOutput<'_> {
+        let header = &input.snapshot.header;
+        // A planner that was started again goes on where the one before it stopped counting.
+        self.table.version = self.table.version.max(header.constraints_version);
+        self.answers.clear();
+        for request in input.requests {
+            self.take(*request);
+        }
+        let repeated = self.answers.len();
+        let mut budget = Budget::new(units);
+        let publish = self.work(scene, input.snapshot, &mut budget);
+        self.counters.units += budget.spent();
+        if publish {
+            self.write_table(header.tick + 1);
+        }
+        for answer in &mut self.answers[repeated..] {
+            answer.constraints_version = self.table.version;
+            self.answered[answer.robot as usize] = Some(*answer);
+            self.journal.add(answer);
+        }
+        PlannerOutput {
+            report: self.report(input.snapshot),
+            answers: &self.answers,
+            table: publish.then_some(&*self.table),
+        }
     }
+
+    /// The table as last published; version 0 before that.
+    #[must_use]
+    pub fn table(&self) -> &ConstraintTable {
+        &self.table
+    }
+
+    /// Takes a request in: into the queue, unless it is there, was answered, or makes no sense.
+    fn take(&mut self, request: HardRequest) {
+        let robot = request.robot as usize;
+        if robot >= self.answered.len() || request.task as usize >= self.tasks {
+            return;
+        }
+        if let Some(answer) = self.answered[robot]
+            && (answer.incarnation, answer.failure) == (request.incarnation, request.failure)
+        {
+            if self
+                .answers
+                .iter()
+                .all(|other| other.robot != request.robot)
+            {
+                self.answers.push(answer);
+            }
+            return;
+        }
+        if let Some(Job::Task(job)) = self.job
+            && is_same(&job, &request)
+        {
+            return;
+        }
+        match self
+            .queue
+            .iter_mut()
+            .find(|waiting| waiting.robot == request.robot)
+        {
+            Some(waiting) if is_same(waiting, &request) => {}
+            Some(waiting) => *waiting = request,
+            None => self.queue.push(request),
+        }
+    }
+
+    /// Works until there is nothing to do or the budget is spent. Whether a new version of the
+    /// table is due.
+    fn work(
+        &mut self,
+        scene: &Scene,
+        snapshot: Checked<WorldSnapshot>,
+        budget: &mut Budget,
+    ) -> bool {
+        let mut publish = false;
+        loop {
+            if self.is_outdated(snapshot) {
+                self.job = None;
+            }
+            if self.job.is_none() {
+                publish |= self.look(snapshot);
+                self.job = self.next_job(scene, snapshot);
+            }
+            let Some(job) = self.job else {
+                return publish;
+            };
+            let Poll::Ready(found) = self.advance(scene, job, budget) else {
+                return publish;
+            };
+            publish |= self.finish(job, found, snapshot.header.tick);
+            self.job = None;
+        }
+    }
+
+    /// Takes over where the objects are. Whether constraints were lost that the table still has.
+    fn look(&mut self, snapshot: Checked<WorldSnapshot>) -> bool {
+        let lost = self.hard.update(open_places(snapshot));
+        if lost && self.method == Method::All {
+            self.table.complete_for_events = u64::MAX;
+        }
+        lost && self.method != Method::All
+    }
+
+    /// Whether the job is about a state of the world that is past.
+    fn is_outdated(&self, snapshot: Checked<WorldSnapshot>) -> bool {
+        matches!(self.job, Some(Job::All { events }) if events != snapshot.header.events)
+    }
+
+    fn next_job(&mut self, scene: &Scene, snapshot: Checked<WorldSnapshot>) -> Option<Job> {
+        let events = snapshot.header.events;
+        if self.method == Method::All && self.table.complete_for_events != events {
+            self.hard.begin_all();
+            return Some(Job::All { events });
+        }
+        if self.queue.is_empty() {
+            return None;
+        }
+        let request = self.queue.remove(0);
+        if self.method.restricts() {
+            self.hard.begin_task(scene, request.task as usize);
+        }
+        Some(Job::Task(request))
+    }
+
+    fn advance(&mut self, scene: &Scene, job: Job, budget: &mut Budget) -> Poll<Found> {
+        if matches!(job, Job::Task(_)) && !self.method.restricts() {
+            // Nothing follows from a failure.
+            return Poll::Ready(Found::default());
+        }
+        self.hard.advance(scene, budget, &mut self.counters)
+    }
+
+    /// Notes what a job has found. Whether that makes a new version of the table.
+    fn finish(&mut self, job: Job, found: Found, tick: u64) -> bool {
+        match job {
+            Job::All { events } => {
+                self.table.complete_for_events = events;
+                true
+            }
+            Job::Task(request) => {
+                self.answers.push(HardAnswer {
+                    robot: request.robot,
+                    incarnation: request.incarnation,
+                    failure: request.failure,
+                    task: request.task,
+                    tick,
+                    constraints_version: 0,
+                    found: found.new,
+                    infeasible: u32::from(found.infeasible),
+                    reserved: 0,
+                });
+                found.new > 0
+            }
+        }
+    }
+
+    /// Writes the next version of the table: all that is known now.
+    fn write_table(&mut self, effect_tick: u64) {
+        let Self {
+            hard,
+            table,
+            dropped,
+            ..
+        } = self;
+        table.version += 1;
+        table.effect_tick = effect_tick;
+        let mut count = 0;
+        hard.for_each(|constraint| {
+            if let Some(slot) = table.constraints.get_mut(count) {
+                *slot = constraint;
+            }
+            count += 1;
+        });
+        table.count = count.min(MAX_CONSTRAINTS) as u32;
+        *dropped = count.saturating_sub(MAX_CONSTRAINTS) as u32;
+        self.table.hash_into(&mut self.journal);
+    }
+
+    fn report(&self, snapshot: Checked<WorldSnapshot>) -> PlannerReport {
+        let outstanding =
+            self.method == Method::All && self.table.complete_for_events != snapshot.header.events;
+        PlannerReport {
+            tick: snapshot.header.tick,
+            state_hash: self.state_hash(),
+            constraints_version: self.table.version,
+            busy: u32::from(self.job.is_some() || !self.queue.is_empty() || outstanding),
+            constraints_dropped: self.dropped,
+            counters: self.counters,
+            ..PlannerReport::default()
+        }
+    }
+
+    /// Hash of all that is private: what was decided and what waits. How far the job has come
+    /// shows in the work done.
+    fn state_hash(&self) -> u64 {
+        let mut hash = self.journal.clone();
+        hash.add(&self.queue[..]);
+        match self.job {
+            None => {}
+            Some(Job::Task(request)) => hash.add(&request),
+            Some(Job::All { events }) => hash.add(&events),
+        }
+        hash.add(&self.counters);
+        hash.finish()
+    }
+}
+
+fn is_same(a: &HardRequest, b: &HardRequest) -> bool {
+    (a.incarnation, a.failure) == (b.incarnation, b.failure)
+}
+
+fn open_places(snapshot: Checked<WorldSnapshot>) -> impl Iterator<Item = Option<Places>> {
+    snapshot.get().objects[..snapshot.header.object_count as usize]
+        .iter()
+        .map(|object| Places::of(object, object.status))
 }

@@ -105,6 +105,11 @@ pub struct PlannerReport {
     pub busy: u32,
     /// Incarnation of its process.
     pub incarnation: u32,
+    /// Constraints found that the newest table has no room for: if not 0, the run is no longer
+    /// the method it claims to be.
+    pub constraints_dropped: u32,
+    /// Always 0.
+    pub reserved: u32,
     /// Work done so far.
     pub counters: Counters,
 }
