@@ -277,3 +277,76 @@ impl Walls {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::testing::{BELOW, room};
+
+    fn scene() -> Scene {
+        let homes = [[9.0, 0.5]];
+        let objects: Vec<_> = (0..12)
+            .map(|i| {
+                let (x, y) = (0.5 + 0.7 * f64::from(i), 1.0 + 0.3 * f64::from(i % 4));
+                [[x, y], [x, y + 2.0]]
+            })
+            .collect();
+        room(&homes, &objects, BELOW, "")
+    }
+
+    fn all(scene: &Scene, ground: &Ground, region: Aabb) -> Vec<usize> {
+        (0..scene.objects.len())
+            .filter(|&o| {
+                let shape = Aabb::of(&scene.objects[o].shape);
+                ground
+                    .place(o)
+                    .is_some_and(|at| shape.at(at).meets(&region))
+            })
+            .collect()
+    }
+
+    proptest! {
+        #[test]
+        fn none_near_is_missed(
+            x in -1.0..11.0, y in -1.0..7.0, width in 0.0..4.0, height in 0.0..4.0,
+            taken in proptest::collection::vec(0_usize..12, 0..12),
+            put in proptest::collection::vec((0_usize..12, 0.3..9.7, 0.3..5.7), 0..12),
+        ) {
+            let scene = scene();
+            let mut ground = Ground::new(&scene);
+            for object in taken {
+                ground.take(object);
+                prop_assert_eq!(ground.place(object), None);
+            }
+            for (object, px, py) in put {
+                ground.take(object);
+                ground.put(object, Vec2::new(px, py));
+            }
+            let corner = Vec2::new(x, y);
+            let region = Aabb::around(corner, corner + Vec2::new(width, height));
+            let mut found = Vec::new();
+            let stopped = ground.find_near(region, |object, _| {
+                found.push(object);
+                false
+            });
+            found.sort_unstable();
+            prop_assert_eq!(stopped, None);
+            prop_assert_eq!(found, all(&scene, &ground, region));
+        }
+
+        #[test]
+        fn no_wall_near_is_missed(x in -1.0..11.0, y in -1.0..7.0, size in 0.0..4.0) {
+            let scene = scene();
+            let walls = Walls::new(&scene);
+            let corner = Vec2::new(x, y);
+            let region = Aabb::around(corner, corner + Vec2::new(size, size));
+            for wall in 0..scene.walls.len() {
+                let (shape, at) = &scene.walls[wall];
+                let near = Aabb::of(shape).at(*at).meets(&region);
+                prop_assert_eq!(walls.any_near(region, |w| w == wall), near);
+            }
+        }
+    }
+}

@@ -398,3 +398,153 @@ fn farthest(
         refusal: Some(refusal),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::testing::{BELOW, Bench, TICK_M, room};
+
+    /// Ticks a way takes at full speed.
+    fn ticks(length_m: f64) -> usize {
+        (length_m / TICK_M - 1e-6).ceil() as usize
+    }
+
+    #[test]
+    fn robots_nose_to_tail_lose_no_time_whatever_their_ids() {
+        // Touching, and the leader has the highest id, so that it comes last in the queue.
+        let homes = [[1.0, 1.0], [1.5, 1.0], [2.0, 1.0], [2.5, 1.0]];
+        let mut bench = Bench::new(room(&homes, &[], BELOW, ""));
+        for (i, home) in homes.iter().enumerate() {
+            bench.ask(i, &[[home[0] + 5.0, home[1]]]);
+        }
+        bench.steps(ticks(5.0));
+        for (i, home) in homes.iter().enumerate() {
+            assert_eq!(bench.at(i), [home[0] + 5.0, home[1]]);
+        }
+        assert_eq!(bench.overlapping(), None);
+    }
+
+    #[test]
+    fn a_follower_stops_when_its_leader_does() {
+        let homes = [[1.0, 1.0], [1.5, 1.0]];
+        let mut bench = Bench::new(room(&homes, &[], BELOW, ""));
+        bench.ask(0, &[[6.0, 1.0]]);
+        bench.ask(1, &[[3.0, 1.0]]);
+        bench.steps(ticks(1.5) + 20);
+        assert_eq!(bench.at(1), [3.0, 1.0]);
+        let gap_m = bench.at(1)[0] - bench.at(0)[0] - 0.5;
+        assert!(gap_m.abs() < 1e-9, "gap {gap_m}");
+        assert_eq!(bench.robot(0).request_open, 1);
+    }
+
+    #[test]
+    fn a_follower_waits_while_its_leader_computes() {
+        let homes = [[1.0, 1.0], [1.5, 1.0]];
+        let mut bench = Bench::new(room(&homes, &[], BELOW, ""));
+        bench.ask(0, &[[6.0, 1.0]]);
+        bench.ask(1, &[[9.0, 1.0]]);
+        bench.commands[1].go = 0;
+        bench.steps(10);
+        assert_eq!(bench.at(0), [1.0, 1.0]);
+        bench.commands[1].go = 1;
+        bench.steps(10);
+        let gap_m = bench.at(1)[0] - bench.at(0)[0] - 0.5;
+        assert!(bench.at(0)[0] > 1.04 && gap_m.abs() < 1e-9, "gap {gap_m}");
+    }
+
+    #[test]
+    fn robots_head_on_stop_before_they_overlap() {
+        let mut bench = Bench::new(room(&[[1.0, 1.0], [4.0, 1.0]], &[], BELOW, ""));
+        bench.ask(0, &[[8.0, 1.0]]);
+        bench.ask(1, &[[1.0, 1.0]]);
+        bench.steps(800);
+        let gap_m = bench.at(1)[0] - bench.at(0)[0] - 0.5;
+        assert!((0.0..TICK_M).contains(&gap_m), "gap {gap_m}");
+        assert!(bench.robot(0).request_open == 1 && bench.robot(1).request_open == 1);
+    }
+
+    #[test]
+    fn turning_into_a_place_waits_until_its_body_has_left() {
+        // Robot 1 leaves upwards from the place that robot 0 enters from the left.
+        let mut bench = Bench::new(room(&[[1.0, 1.0], [1.5, 1.0]], &[], BELOW, ""));
+        bench.ask(0, &[[1.5, 1.0]]);
+        bench.ask(1, &[[1.5, 2.0]]);
+        for tick in 1..=ticks(0.5) {
+            bench.step();
+            assert_eq!(bench.at(0), [1.0, 1.0], "tick {tick}");
+            assert_eq!(bench.overlapping(), None);
+        }
+        bench.steps(ticks(0.5));
+        assert_eq!(bench.at(0), [1.5, 1.0], "gone after as many ticks again");
+    }
+
+    #[test]
+    fn the_oldest_request_comes_first_then_the_lowest_id() {
+        let homes = [[1.0, 1.0], [3.0, 1.0], [2.0, 3.0]];
+        let mut bench = Bench::new(room(&homes, &[], BELOW, ""));
+        // Robot 2 stands still of its own will, but has asked first.
+        bench.ask(2, &[[2.0, 1.0]]);
+        bench.commands[2].go = 0;
+        bench.step();
+        bench.ask(0, &[[2.0, 1.0]]);
+        bench.ask(1, &[[2.0, 1.0]]);
+        bench.steps(300);
+        assert_eq!(bench.robot(2).request_open, 0);
+        assert!(bench.at(0)[0] <= 1.5 && bench.at(1)[0] >= 2.5);
+        bench.commands[2].go = 1;
+        bench.steps(ticks(2.0));
+        assert_eq!(bench.at(2), [2.0, 1.0]);
+
+        let mut bench = Bench::new(room(&homes[..2], &[], BELOW, ""));
+        bench.ask(1, &[[2.0, 1.0]]);
+        bench.ask(0, &[[2.0, 1.0]]);
+        bench.step();
+        assert_eq!(
+            (bench.robot(0).request_open, bench.robot(1).request_open),
+            (0, 1)
+        );
+        assert_eq!(bench.world.counters().grants_refused, 1);
+        bench.steps(20);
+        assert_eq!(bench.world.counters().grants_refused, 1, "counted once");
+    }
+
+    #[test]
+    fn a_grant_stops_short_of_an_object() {
+        let mut bench = Bench::new(room(&[[1.0, 1.0]], &[[[3.0, 1.0], [5.0, 5.0]]], BELOW, ""));
+        bench.ask(0, &[[8.0, 1.0]]);
+        bench.steps(600);
+        let gap_m = 3.0 - 0.2 - 0.25 - bench.at(0)[0];
+        assert!((-1e-12..1e-4).contains(&gap_m), "gap {gap_m}");
+        assert_eq!(bench.robot(0).request_open, 1);
+    }
+
+    #[test]
+    fn clearance_is_kept_from_robots_and_objects() {
+        let objects = [[[3.0, 1.0], [5.0, 5.0]]];
+        let homes = [[1.0, 1.0], [5.0, 3.0], [7.0, 3.0]];
+        let mut bench = Bench::new(room(&homes, &objects, [0.0, -0.5], "clearance = 0.05"));
+        bench.ask(0, &[[8.0, 1.0]]);
+        bench.ask(1, &[[7.0, 3.0]]);
+        bench.steps(600);
+        let gap_m = 3.0 - 0.2 - 0.25 - bench.at(0)[0];
+        assert!((0.05 - 1e-12..0.05 + 1e-4).contains(&gap_m), "gap {gap_m}");
+        let gap_m = bench.at(2)[0] - bench.at(1)[0] - 0.5;
+        assert!((0.05 - 1e-12..0.05 + 1e-4).contains(&gap_m), "gap {gap_m}");
+    }
+
+    #[test]
+    fn a_long_path_with_many_corners_is_used_by_arc_length() {
+        let mut bench = Bench::new(room(&[[1.0, 1.0]], &[], BELOW, ""));
+        let corners: Vec<[f64; 2]> = (1..=30)
+            .map(|k| {
+                [
+                    1.0 + 0.05 * f64::from((k + 1) / 2),
+                    1.0 + 0.05 * f64::from(k / 2),
+                ]
+            })
+            .collect();
+        bench.ask(0, &corners);
+        bench.steps(ticks(30.0 * 0.05));
+        assert_eq!(bench.at(0), corners[29]);
+        assert_eq!(bench.robot(0).grant_count, 0);
+    }
+}

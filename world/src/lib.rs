@@ -37,6 +37,8 @@ mod settled;
 mod state;
 mod step;
 mod tasks;
+#[cfg(test)]
+mod testing;
 mod wire;
 
 pub use accounts::{ActivityTimes, WorldCounters};

@@ -198,3 +198,76 @@ impl Track {
         self.end()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn path(points: &[[f64; 2]]) -> Path {
+        let mut path = Path::EMPTY;
+        for &[x, y] in points {
+            path.push(Vec2::new(x, y));
+        }
+        path
+    }
+
+    #[test]
+    fn arc_length_goes_on_across_corners() {
+        let ahead = path(&[[1.0, 0.0], [1.0, 1.0], [3.0, 1.0]]);
+        let track = Track::walk(Vec2::zeros(), &ahead, 2.5);
+        assert_eq!(track.end(), Vec2::new(1.5, 1.0));
+        assert_eq!(track.used(), 2);
+        assert_eq!(track.at(1.25), Vec2::new(1.0, 0.25));
+        assert_eq!(track.moved_m(), 2.5);
+        assert_eq!(track.next_corner_m(0.0), 1.0);
+        assert_eq!(track.next_corner_m(2.5), f64::INFINITY);
+    }
+
+    #[test]
+    fn a_track_ends_where_the_path_does() {
+        let track = Track::walk(Vec2::zeros(), &path(&[[1.0, 0.0]]), 2.5);
+        assert_eq!(track.end(), Vec2::new(1.0, 0.0));
+        assert_eq!((track.moved_m(), track.used()), (1.0, 1));
+        assert_eq!(track.at(2.0), track.end());
+    }
+
+    #[test]
+    fn only_so_many_pieces_fit_in_a_tick() {
+        let ahead = path(&[[0.1, 0.0], [0.1, 0.1], [0.2, 0.1], [0.2, 0.2], [0.3, 0.2]]);
+        let track = Track::walk(Vec2::zeros(), &ahead, 9.0);
+        assert_eq!(track.used(), MAX_PIECES);
+        assert!(track.is_full());
+        assert_eq!(track.end(), Vec2::new(0.2, 0.2));
+    }
+
+    proptest! {
+        /// However many ticks it takes and wherever the corners are: rounding costs no tick and
+        /// the points are reached exactly.
+        #[test]
+        fn no_arc_length_is_lost_over_many_ticks(
+            points in proptest::collection::vec((0_i32..200, 0_i32..200), 1..12),
+            tick_mm in 3_u32..40,
+        ) {
+            let budget_m = f64::from(tick_mm) * 1e-3;
+            let mut ahead = Path::EMPTY;
+            for (x, y) in points {
+                ahead.push(Vec2::new(f64::from(x) * 0.05, f64::from(y) * 0.05));
+            }
+            let length_m = ahead.length_from(Vec2::zeros());
+            let (goal, mut at, mut ticks) = (ahead.last().unwrap(), Vec2::zeros(), 0);
+            while !ahead.is_empty() {
+                let track = Track::walk(at, &ahead, budget_m);
+                prop_assert!(track.moved_m() <= budget_m);
+                at = track.end();
+                ahead.drop_front(track.used());
+                ticks += 1;
+            }
+            prop_assert_eq!(at, goal);
+            let exact = length_m / budget_m;
+            prop_assert!((f64::from(ticks) - exact) < 1.0 + 1e-6, "{ticks} ticks for {exact}");
+            prop_assert!(f64::from(ticks) > exact - 1e-6);
+        }
+    }
+}
