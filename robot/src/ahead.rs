@@ -102,3 +102,89 @@ fn cut_piece(from: Vec2, to: Vec2, lattice: &Lattice, left_m: f64) -> (Vec2, f64
     let end = a + taken * (right.signum() + up.signum() * width);
     (lattice.at(end as u32), taken as f64 * step_m)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A lattice of pitch 0.05 m.
+    fn lattice() -> Lattice {
+        let text = r#"
+            name = "room"
+            [robot]
+            shape = { box = [0.5, 0.5] }
+            speed = 0.5
+            [object]
+            shape = { box = [0.4, 0.4] }
+            grasp = [0.0, -0.45]
+            [workspace]
+            bounds = [0.0, 0.0, 4.0, 3.0]
+            [[robots]]
+            home = [0.5, 0.5]
+            [[objects]]
+            start = [1.5, 2.0]
+            goal = [3.0, 2.0]
+        "#;
+        scene::parse(text, "room").unwrap().lattice
+    }
+
+    fn cut(path: &[[f64; 2]], length_m: f64) -> Vec<[f64; 2]> {
+        let path: Vec<_> = path.iter().map(|p| Vec2::new(p[0], p[1])).collect();
+        let mut ahead = Ahead::NOWHERE;
+        ahead.cut(&path, &lattice(), length_m);
+        let request = ahead.request(1);
+        // Places on the lattice are sums of steps: compare them to a nanometre.
+        let round = |x: f64| (x * 1e9).round() / 1e9;
+        request
+            .points()
+            .iter()
+            .map(|p| [round(p.x), round(p.y)])
+            .collect()
+    }
+
+    #[test]
+    fn a_straight_piece_is_cut_at_a_lattice_point_at_or_after_the_length() {
+        let path = [[0.5, 0.5], [2.0, 0.5]];
+        assert_eq!(cut(&path, 0.1), [[0.5, 0.5], [0.6, 0.5]]);
+        assert_eq!(cut(&path, 0.12), [[0.5, 0.5], [0.65, 0.5]]);
+        assert_eq!(cut(&path, 0.01), [[0.5, 0.5], [0.55, 0.5]]);
+        let diagonal = [[1.0, 1.0], [0.5, 1.5]];
+        assert_eq!(cut(&diagonal, 0.1), [[1.0, 1.0], [0.9, 1.1]]);
+    }
+
+    #[test]
+    fn a_cut_counts_length_across_corners() {
+        let path = [[0.5, 0.5], [0.55, 0.5], [0.55, 1.0]];
+        assert_eq!(cut(&path, 0.1), [[0.5, 0.5], [0.55, 0.5], [0.55, 0.55]]);
+        assert_eq!(cut(&path, 0.05), [[0.5, 0.5], [0.55, 0.5]]);
+    }
+
+    #[test]
+    fn pieces_off_the_lattice_are_taken_whole_and_short_paths_entirely() {
+        assert_eq!(
+            cut(&[[0.52, 0.5], [0.55, 0.5], [2.0, 0.5]], 0.1),
+            [[0.52, 0.5], [0.55, 0.5], [0.65, 0.5]]
+        );
+        assert_eq!(
+            cut(&[[0.5, 0.5], [0.55, 0.5]], 0.1),
+            [[0.5, 0.5], [0.55, 0.5]]
+        );
+        let mut ahead = Ahead::NOWHERE;
+        ahead.cut(&[Vec2::new(0.5, 0.5)], &lattice(), 0.1);
+        assert!(ahead.stays());
+        assert_eq!(ahead.start(), Some(Vec2::new(0.5, 0.5)));
+    }
+
+    #[test]
+    fn a_request_holds_no_more_corners_than_a_message() {
+        let zigzag: Vec<_> = (0..100)
+            .map(|k| {
+                [
+                    0.5 + 0.05 * f64::from(k / 2 + k % 2),
+                    0.5 + 0.05 * f64::from(k / 2),
+                ]
+            })
+            .collect();
+        assert_eq!(cut(&zigzag, 100.0).len(), MAX_PATH_POINTS);
+    }
+}

@@ -94,5 +94,5 @@ pub(crate) fn claim(now: &Now<'_>, task: Option<usize>) -> Claim {
 /// before a selection (rule 23).
 fn constraints_are_known(now: &Now<'_>, thinking: &Thinking) -> bool {
     now.table.version == now.snapshot.header.epoch_constraints_version
-        && Selection::is_ready(&thinking.settings, now.snapshot, now.table.get())
+        && thinking.selection.is_ready(now.snapshot, now.table.get())
 }

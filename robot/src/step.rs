@@ -90,6 +90,13 @@ impl Robot {
         self.intent.hard_request
     }
 
+    /// A cycle among the tasks that the newest selection found, each before the next and the last
+    /// before the first; empty if there was none (rule 15).
+    #[must_use]
+    pub fn cycle(&self) -> &[usize] {
+        self.thinking.selection.cycle()
+    }
+
     /// What the present phase leads to.
     fn act(&mut self, now: &Now<'_>) -> Next {
         let (thinking, intent) = (&mut self.thinking, &mut self.intent);

@@ -3,6 +3,8 @@
 //! Responsible for: gathering what the machines know at the end.
 //! Not responsible for: turning it into a result (the binary does).
 
+use std::fmt;
+
 use shm_types::{Counters, Outcome};
 use world::{ActivityTimes, WorldCounters};
 
@@ -51,5 +53,16 @@ impl SimReport {
             easy_constraints: sum.easy_constraints + one.easy_constraints,
             units: sum.units + one.units,
         })
+    }
+}
+
+/// Tasks each of which comes before the next, and the last before the first (rule 15).
+pub(crate) struct Cycle<'a>(pub(crate) &'a [usize]);
+
+impl fmt::Display for Cycle<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "cycle: ")?;
+        self.0.iter().try_for_each(|task| write!(f, "{task} → "))?;
+        self.0.first().map_or(Ok(()), |first| write!(f, "{first}"))
     }
 }

@@ -15,7 +15,7 @@ use shm_types::{
 };
 use world::{FIRST_INCARNATION, World, WorldInput};
 
-use crate::report::{RobotReport, SimReport};
+use crate::report::{Cycle, RobotReport, SimReport};
 use crate::tables::Tables;
 
 /// Watches a run: called after every tick with the snapshot it led to and the motion that led
@@ -75,12 +75,15 @@ impl<'s> Simulation<'s> {
             snapshot,
             motion: zeroed(),
             commands: vec![Command::default(); robots],
-            report: PlannerReport::default(),
+            report: PlannerReport {
+                incarnation: FIRST_INCARNATION,
+                ..PlannerReport::default()
+            },
             asked: Vec::with_capacity(robots),
             staged: Vec::with_capacity(robots),
             answers: vec![None; robots],
             tables: Tables::new(),
-            control: Vec::with_capacity(1),
+            control: Vec::with_capacity(robots + 1),
             control_id: 0,
             settings: settings.clone(),
         }
@@ -106,14 +109,31 @@ impl<'s> Simulation<'s> {
 
     /// Ends the run with the next tick.
     pub fn stop(&mut self) {
+        self.tell(ControlKind::Stop, RoleKind::World, 0, FIRST_INCARNATION);
+    }
+
+    /// Puts another process in the place of robot `id`'s. It takes part from the next tick on and
+    /// knows only what the snapshots say.
+    ///
+    /// # Panics
+    /// When there is no such robot.
+    pub fn restart_robot(&mut self, id: usize) {
+        let incarnation = self.commands[id].incarnation + 1;
+        self.robots[id] = Robot::new(self.scene, self.settings.clone(), id, incarnation);
+        self.commands[id].incarnation = incarnation;
+        self.answers[id] = None;
+        self.staged.retain(|request| request.robot as usize != id);
+        self.tell(ControlKind::Up, RoleKind::Robot, id, incarnation);
+    }
+
+    fn tell(&mut self, kind: ControlKind, role: RoleKind, index: usize, incarnation: u32) {
         self.control_id += 1;
-        self.control.clear();
         self.control.push(ControlRequest {
             id: self.control_id,
-            kind: ControlKind::Stop.code(),
-            role: RoleKind::World.code(),
-            index: 0,
-            incarnation: FIRST_INCARNATION,
+            kind: kind.code(),
+            role: role.code(),
+            index: index as u32,
+            incarnation,
         });
     }
 
@@ -163,7 +183,10 @@ impl<'s> Simulation<'s> {
             requests: &self.staged,
         };
         let output = self.planner.step(self.scene, input, units);
-        self.report = output.report;
+        self.report = PlannerReport {
+            incarnation: FIRST_INCARNATION,
+            ..output.report
+        };
         for answer in output.answers {
             self.answers[answer.robot as usize] = Some(*answer);
         }
@@ -215,14 +238,18 @@ impl<'s> Simulation<'s> {
     }
 
     fn reason(&self) -> Option<String> {
-        let stuck = self
-            .world
-            .stuck_reason(self.scene)
-            .map(|reason| reason.to_string());
-        stuck.or_else(|| {
-            self.world
-                .violation()
-                .map(|violation| format!("{violation:?}"))
+        if let Some(violation) = self.world.violation() {
+            return Some(format!("{violation:?}"));
+        }
+        let stuck = self.world.stuck_reason(self.scene)?;
+        let cycle = self
+            .robots
+            .iter()
+            .map(Robot::cycle)
+            .find(|cycle| !cycle.is_empty());
+        Some(match cycle {
+            Some(cycle) => format!("{stuck}; tasks wait for each other in a {}", Cycle(cycle)),
+            None => stuck.to_string(),
         })
     }
 }

@@ -22,8 +22,10 @@ pub(crate) struct Tables {
 impl Tables {
     /// Nothing published yet.
     pub(crate) fn new() -> Self {
+        let mut empty: Box<ConstraintTable> = zeroed();
+        empty.complete_for_events = u64::MAX;
         Self {
-            empty: zeroed(),
+            empty,
             kept: std::array::from_fn(|_| zeroed()),
             newest: None,
         }

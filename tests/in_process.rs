@@ -1,0 +1,181 @@
+//! Whole runs in one thread: every small scenario, every number of robots, every method.
+
+use std::ops::ControlFlow;
+
+use scene::{Method, Scene, Settings, builtin::BUILTIN};
+use shm_types::{Activity, MotionBatch, Outcome, WorldSnapshot};
+use sim::{SimReport, Simulation};
+
+const NS_PER_S: u64 = 1_000_000_000;
+
+fn parse(name: &str, text: &str) -> Scene {
+    scene::parse(text, name).unwrap_or_else(|e| panic!("{e:?}"))
+}
+
+fn shipped(name: &str) -> Scene {
+    parse(name, scene::builtin(name).unwrap().text)
+}
+
+fn with(method: Method) -> Settings {
+    Settings { method, ..Settings::default() }
+}
+
+/// Runs to the end; checks what must hold of every run.
+fn run(scene: &Scene, settings: &Settings) -> SimReport {
+    let mut before = (0, 0);
+    let mut watch = |snapshot: &WorldSnapshot, motion: &MotionBatch| {
+        let header = &snapshot.header;
+        assert_eq!(header.tick, before.0 + 1);
+        assert!(header.epoch == before.1 || header.epoch == before.1 + 1 || header.tick == 1);
+        assert_eq!(motion.tick, header.tick);
+        before = (header.tick, header.epoch);
+        ControlFlow::Continue(())
+    };
+    let report = Simulation::new(scene, settings, 1).run(&mut watch);
+    let who = format!("{} × {} × {}", scene.name, scene.homes.len(), settings.method);
+    assert_eq!(report.world.violations, 0, "{who}: {:?}", report.reason);
+    assert_eq!(report.world.selection_conflicts, 0, "{who}");
+    assert_eq!(report.world.invalid_requests, 0, "{who}");
+    assert_eq!(report.world.stale_commands, 0, "{who}");
+    for robot in &report.robots {
+        assert_eq!(robot.times.total(), report.ticks, "{who}");
+    }
+    match report.outcome {
+        Outcome::Solved => assert_eq!(report.reason, None, "{who}"),
+        Outcome::Stuck => assert!(report.reason.is_some(), "{who}"),
+        other => panic!("{who}: {other:?} after {} s", report.time_ns / NS_PER_S),
+    }
+    report
+}
+
+/// The scenarios that isolate one thing each.
+fn small() -> impl Iterator<Item = Scene> {
+    BUILTIN
+        .iter()
+        .filter(|scenario| !scenario.name.starts_with("paper-"))
+        .map(|scenario| parse(scenario.name, scenario.text))
+}
+
+#[test]
+fn every_small_run_ends_solved_or_stuck_for_a_reason() {
+    for scene in small() {
+        for robots in 1..=scene.homes.len() {
+            let scene = scene.with_robots(robots).unwrap();
+            for &method in Method::ALL {
+                run(&scene, &with(method));
+            }
+        }
+    }
+}
+
+#[test]
+fn rooms_that_the_methods_can_finish_are_finished() {
+    for name in ["e1", "h1"] {
+        let scene = shipped(name);
+        for robots in 1..=scene.homes.len() {
+            let scene = scene.with_robots(robots).unwrap();
+            for &method in Method::ALL {
+                let report = run(&scene, &with(method));
+                assert_eq!(report.outcome, Outcome::Solved, "{name} × {robots} × {method}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_swap_is_a_cycle_of_tasks_and_the_reason_says_so() {
+    let report = run(&shipped("swap"), &with(Method::GraspingAndRestricted));
+    assert_eq!(report.outcome, Outcome::Stuck);
+    let reason = report.reason.unwrap();
+    assert!(reason.contains("cycle: 0 → 1 → 0"), "{reason}");
+}
+
+#[test]
+fn a_run_is_the_same_every_time_at_every_tick() {
+    let scene = shipped("h1");
+    for &method in Method::ALL {
+        let settings = with(method);
+        let mut one = Simulation::new(&scene, &settings, 1);
+        let mut other = Simulation::new(&scene, &settings, 1);
+        while one.outcome() == Outcome::Running {
+            let (a, b) = (one.tick().header.state_hash, other.tick().header.state_hash);
+            assert_eq!(a, b, "{method}, tick {}", one.snapshot().header.tick);
+        }
+        assert_eq!(other.outcome(), one.outcome());
+    }
+}
+
+#[test]
+fn slow_computers_find_the_same_and_stand_still_for_it() {
+    let scene = shipped("h1");
+    for &method in Method::ALL {
+        let fast = run(&scene, &with(method));
+        let slow = run(&scene, &Settings { units_per_second: 5_000, ..with(method) });
+        assert_eq!(slow.outcome, Outcome::Solved, "{method}");
+        let computing = |report: &SimReport| -> u64 {
+            report.robots.iter().map(|robot| robot.times.ticks(Activity::Computing)).sum()
+        };
+        assert!(computing(&slow) > 100 * computing(&fast).max(1), "{method}");
+        assert!(slow.time_ns > fast.time_ns, "{method}");
+    }
+}
+
+#[test]
+fn one_computer_for_all_is_slower_than_one_each() {
+    let scene = shipped("h1");
+    let own = Settings { units_per_second: 20_000, ..with(Method::All) };
+    let shared = Settings { compute: scene::Compute::Shared, ..own.clone() };
+    assert!(run(&scene, &shared).time_ns > run(&scene, &own).time_ns);
+}
+
+/// One robot, one object, nothing in the way: it moves all the time but for the tick of each grip,
+/// although it plans anew every 0.1 m.
+#[test]
+fn a_look_that_is_done_within_its_step_costs_no_motion() {
+    let text = r#"
+        name = "alone"
+        [robot]
+        shape = { box = [0.5, 0.5] }
+        speed = 0.5
+        [object]
+        shape = { box = [0.4, 0.4] }
+        grasp = [0.0, -0.45]
+        [workspace]
+        bounds = [0.0, 0.0, 4.0, 3.0]
+        [[robots]]
+        home = [0.5, 0.5]
+        [[objects]]
+        start = [1.5, 0.95]
+        goal = [3.0, 0.95]
+    "#;
+    let scene = parse("alone", text);
+    let report = run(&scene, &with(Method::GraspingAndRestricted));
+    assert_eq!(report.outcome, Outcome::Solved);
+    let times = report.robots[0].times;
+    // 1 m to the grasp, 1.5 m to the goal; home again round the object: at least 2.5 m.
+    assert_eq!(times.ticks(Activity::Gripping), 2);
+    assert_eq!(times.ticks(Activity::Waiting), 0);
+    assert_eq!(times.ticks(Activity::Computing), 0);
+    assert_eq!(times.ticks(Activity::Idle), 0);
+    assert_eq!(times.ticks(Activity::Moving), 500 + 500);
+    assert!(report.counters().path_plans > 50);
+}
+
+/// What every one of a run's robots holds to be its place after a restart is in the snapshot.
+#[test]
+fn restarted_robots_take_up_where_they_were() {
+    let scene = shipped("h1");
+    for every in [7, 61, 333] {
+        let settings = with(Method::GraspingAndRestricted);
+        let mut simulation = Simulation::new(&scene, &settings, 1);
+        while simulation.outcome() == Outcome::Running {
+            let tick = simulation.tick().header.tick;
+            if tick % every == 0 && tick < 5_000 {
+                simulation.restart_robot((tick / every) as usize % scene.homes.len());
+            }
+        }
+        let report = simulation.report();
+        assert_eq!(report.outcome, Outcome::Solved, "every {every} ticks: {:?}", report.reason);
+        assert_eq!(report.world.selection_conflicts, 0);
+    }
+}
