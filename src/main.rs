@@ -1,2 +1,20 @@
-//! The `rearrange` binary.
-fn main() {}
+//! The `rearrange` binary: parses the command line, does it, ends with a status.
+
+mod cli;
+mod commands;
+mod drivers;
+mod exit;
+mod lower_bound;
+mod output;
+mod progress;
+mod result;
+mod run_options;
+mod scenario;
+mod table;
+
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    commands::execute(cli::Cli::parse())
+}

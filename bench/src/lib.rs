@@ -1,1 +1,8 @@
 //! Workloads, histograms, reports.
+//!
+//! Responsible for: what is measured, how often, and the numbers that follow; the machine they
+//! were measured on.
+//! Not responsible for: command lines or printing (the binary), or what is correct (tests).
+
+pub mod machine;
+pub mod speed;

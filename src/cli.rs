@@ -1,0 +1,198 @@
+//! The command line: every command, its options, their ranges and what the help says.
+//!
+//! Responsible for: what clap parses. Out-of-range values and unknown names end here, with
+//! status 2 and the allowed values.
+//! Not responsible for: doing anything (see [`crate::commands`]).
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::exit::STATUSES;
+use crate::run_options::RunArgs;
+
+/// Moves objects to their goals in narrow rooms with several mobile robots.
+///
+/// Each robot is a process of its own; the world's state lies in shared memory and is read in
+/// place. Start with `rearrange run`.
+#[derive(Debug, Parser)]
+#[command(name = "rearrange", version, propagate_version = true, after_help = OVERVIEW)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+const OVERVIEW: &str = "\
+Examples:
+  rearrange run                              the built-in room paper-68a, four robot processes
+  rearrange run room.toml --robots 2 --json  your own room, the result as JSON
+  rearrange scenarios                        the rooms inside this binary
+  rearrange validate room.toml               is a scenario file right?
+
+Logs go to stderr: RUST_LOG=debug shows more. NO_COLOR and pipes are respected.";
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Carry all objects of a scenario to their goals, and check what happened
+    Run(Box<RunArgs>),
+    /// Replay a trace with independent geometry and report what it violates
+    Check(CheckArgs),
+    /// Make a random room that is certain to have a solution
+    Generate(GenerateArgs),
+    /// Print the JSON Schema of scenario files
+    #[command(after_help = "Example:\n  rearrange schema > scenario.schema.json")]
+    Schema,
+    /// Say whether a scenario file is right, and what is wrong with it
+    Validate(ValidateArgs),
+    /// List the built-in scenarios, or write them out
+    Scenarios(ScenariosArgs),
+    /// List the runs that are alive on this machine
+    List(ListArgs),
+    /// Measure how fast this machine runs a scenario
+    Bench(BenchArgs),
+    /// [role] The process that owns the state of all bodies
+    #[command(hide = true)]
+    World(RoleArgs),
+    /// [role] The process that works out hard constraints
+    #[command(hide = true)]
+    Planner(RoleArgs),
+    /// [role] The process that moves one robot
+    #[command(hide = true)]
+    Robot(RoleArgs),
+    /// [role] The process that writes the trace
+    #[command(hide = true)]
+    Recorder(RoleArgs),
+}
+
+/// What a process of a run is started with, by the supervisor.
+#[derive(Debug, Args)]
+pub(crate) struct RoleArgs {
+    /// Directory of the run
+    #[arg(long = "run", value_name = "DIR")]
+    pub(crate) run: PathBuf,
+    /// Which robot, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..MAX_ROBOTS))]
+    pub(crate) index: u32,
+}
+
+const MAX_ROBOTS: i64 = shm_types::capacity::MAX_ROBOTS as i64;
+
+#[derive(Debug, Args)]
+#[command(after_help = format!("Example:\n  rearrange run --trace run.mcap && rearrange check run.mcap\n\n{STATUSES}"))]
+pub(crate) struct CheckArgs {
+    /// Trace written by `rearrange run --trace`
+    #[arg(value_name = "TRACE.mcap")]
+    pub(crate) trace: PathBuf,
+    /// Print the report as one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = format!("\
+The room is made by setting the objects at their goals and scrambling them by legal moves of one
+robot at a time; the moves in reverse prove that it can be solved, and are kept in the file.
+
+Example:
+  rearrange generate --seed 7 --objects 8 --robots 3 --area 40 -o room.toml
+  rearrange run room.toml
+
+{STATUSES}"))]
+pub(crate) struct GenerateArgs {
+    /// Seed: the same one gives the same room
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Number of objects
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=MAX_OBJECTS))]
+    pub(crate) objects: u32,
+    /// Number of robots
+    #[arg(long, value_name = "M", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=MAX_ROBOTS))]
+    pub(crate) robots: u32,
+    /// Free floor, square metres
+    #[arg(long, value_name = "M2", default_value_t = 40.0, value_parser = number(4.0, 100_000.0))]
+    pub(crate) area: f64,
+    /// Number of inner walls
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    pub(crate) walls: u32,
+    /// Write to this file instead of stdout
+    #[arg(long, short, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+}
+
+const MAX_OBJECTS: i64 = shm_types::capacity::MAX_OBJECTS as i64;
+
+#[derive(Debug, Args)]
+#[command(after_help = format!("Example:\n  rearrange validate room.toml\n\n{STATUSES}"))]
+pub(crate) struct ValidateArgs {
+    /// Scenario file (TOML), or the name of a built-in scenario
+    pub(crate) scenario: String,
+    /// Take only the first M robots
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=MAX_ROBOTS))]
+    pub(crate) robots: Option<u32>,
+}
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  rearrange scenarios\n  rearrange scenarios --write rooms/\n  \
+                        rearrange scenarios paper-17a > mine.toml"
+)]
+pub(crate) struct ScenariosArgs {
+    /// Print this scenario
+    #[arg(value_name = "NAME", conflicts_with = "write")]
+    pub(crate) name: Option<String>,
+    /// Write all of them as NAME.toml into this directory, made if need be
+    #[arg(long, value_name = "DIR")]
+    pub(crate) write: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ListArgs {
+    /// Print a JSON array
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchArgs {
+    #[command(subcommand)]
+    pub(crate) workload: Workload,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Workload {
+    /// World time per wall time: in process, and in lockstep with one process per robot
+    Speed(SpeedArgs),
+}
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  rearrange bench speed paper-68a --ticks 100000 --json\n\n\
+                        The scenario is run again and again until that many ticks are measured; \
+                        setting up is not timed."
+)]
+pub(crate) struct SpeedArgs {
+    /// Scenario file (TOML), or the name of a built-in scenario
+    #[arg(default_value = crate::scenario::DEFAULT)]
+    pub(crate) scenario: String,
+    /// Measure at least this many ticks with each driver
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    pub(crate) ticks: u64,
+    /// Take only the first M robots
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=MAX_ROBOTS))]
+    pub(crate) robots: Option<u32>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Parses a finite number within the closed range, for clap.
+pub(crate) fn number(
+    least: f64,
+    most: f64,
+) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
+    move |text| match text.parse::<f64>() {
+        Ok(value) if value >= least && value <= most => Ok(value),
+        Ok(_) => Err(format!("must be from {least} to {most}")),
+        Err(_) => Err(format!("must be a number from {least} to {most}")),
+    }
+}

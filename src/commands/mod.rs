@@ -1,0 +1,63 @@
+//! One file per command.
+//!
+//! Responsible for: which file does which command, and the end of a failed one.
+//! Not responsible for: parsing (`cli`).
+
+mod bench;
+mod check;
+mod generate;
+mod list;
+mod roles;
+mod run;
+mod scenarios;
+mod schema;
+mod validate;
+
+use std::io::IsTerminal;
+use std::process::ExitCode;
+
+use tracing_subscriber::EnvFilter;
+
+use crate::cli::{Cli, Command, Workload};
+use crate::exit::Outcome;
+
+/// Does what the command line asks for.
+pub(crate) fn execute(cli: Cli) -> ExitCode {
+    log_to_stderr();
+    match dispatch(cli.command) {
+        Ok(exit) => exit.into(),
+        Err(failure) => {
+            failure.print();
+            failure.exit.into()
+        }
+    }
+}
+
+fn dispatch(command: Command) -> Outcome {
+    match command {
+        Command::Run(args) => run::main(&args),
+        Command::Check(args) => check::main(&args),
+        Command::Generate(args) => generate::main(&args),
+        Command::Schema => schema::main(),
+        Command::Validate(args) => validate::main(&args),
+        Command::Scenarios(args) => scenarios::main(&args),
+        Command::List(args) => list::main(&args),
+        Command::Bench(args) => match args.workload {
+            Workload::Speed(args) => bench::speed(&args),
+        },
+        Command::World(args) => roles::main(node::Role::World, &args),
+        Command::Planner(args) => roles::main(node::Role::Planner, &args),
+        Command::Robot(args) => roles::main(node::Role::Robot(args.index), &args),
+        Command::Recorder(args) => roles::main(node::Role::Recorder, &args),
+    }
+}
+
+fn log_to_stderr() {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
+    let colour = std::io::stderr().is_terminal() && !crate::output::no_colour();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(colour)
+        .init();
+}

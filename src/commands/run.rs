@@ -1,0 +1,203 @@
+//! `rearrange run`: a scenario from its file to a checked result.
+//!
+//! Responsible for: the order of things — read, look for a proof that it cannot be solved, run,
+//! check, say what came out.
+//! Not responsible for: any of these steps.
+
+use node::RunOptions;
+use scene::{Infeasible, Scene};
+use shm_types::Outcome as RunOutcome;
+use trace::CheckReport;
+
+use crate::drivers::{Finished, in_process, processes};
+use crate::exit::{Exit, Failure, Outcome};
+use crate::progress::Progress;
+use crate::result::{Checker, Counts, Ending, Options, RunResult, Times, hex, seconds};
+use crate::run_options::{Driver, RunArgs};
+use crate::{lower_bound, output, result, scenario, table};
+
+/// Violations quoted in the result.
+const MOST_QUOTED: usize = 10;
+
+/// Runs, and prints the result.
+pub(crate) fn main(args: &RunArgs) -> Outcome {
+    args.check()
+        .map_err(|error| Failure::new(Exit::Usage, error))?;
+    let scene = scenario::load(&args.scenario, args.robots)?;
+    let options = options(args);
+    let frame = frame(&scene, args, &options);
+    let result = match planner::certificate(&scene) {
+        Some(proof) => infeasible(frame, &proof),
+        None => {
+            let finished = drive(&scene, args, options)?;
+            complete(frame, &scene, args, finished)
+        }
+    };
+    if args.json {
+        output::print_json(&result)?;
+    } else {
+        output::print(&table::render(&result, output::wants_colour()))?;
+    }
+    Ok(result.outcome.exit())
+}
+
+fn options(args: &RunArgs) -> RunOptions {
+    RunOptions {
+        clock: args.clock(),
+        wait: args.process.wait,
+        pin: args.process.pin,
+        realtime_scheduling: args.process.realtime,
+        monitors: args.process.monitors,
+        delays: args.process.delay.clone(),
+        trace: args.trace.clone(),
+        hashes: args.hashes.clone(),
+        ..RunOptions::new(args.settings())
+    }
+}
+
+fn drive(scene: &Scene, args: &RunArgs, options: RunOptions) -> Result<Finished, Failure> {
+    let goals = scene.objects.iter().filter(|object| object.goal.is_some());
+    let mut progress = Progress::new(goals.count());
+    let finished = match args.process.driver {
+        Driver::InProcess => in_process::run(scene, &options, &progress),
+        Driver::Processes => {
+            processes::run(scene, args.process.name.clone(), options, &mut progress)
+        }
+    };
+    progress.clear();
+    finished
+}
+
+/// A result that says what was asked for, and nothing yet of what came out.
+fn frame(scene: &Scene, args: &RunArgs, options: &RunOptions) -> RunResult {
+    RunResult {
+        schema_version: result::SCHEMA_VERSION,
+        program_version: env!("CARGO_PKG_VERSION"),
+        date: bench::machine::date_utc(),
+        scenario: scene.name.clone(),
+        scenario_hash: hex(scene.hash),
+        seed: None,
+        options: Options {
+            units_per_tick: options.settings.units_per_tick(1),
+            run: options.clone(),
+        },
+        machine: bench::machine::Machine::current(),
+        method: options.settings.method.word().to_owned(),
+        robots: scene.homes.len(),
+        objects: scene.objects.len(),
+        driver: match args.process.driver {
+            Driver::InProcess => "in-process",
+            Driver::Processes => "processes",
+        },
+        outcome: Ending::Failed,
+        reason: None,
+        makespan_s: None,
+        execution_s: None,
+        planning_s: None,
+        waiting_s: None,
+        idle_s: None,
+        lower_bound_s: None,
+        times: None,
+        counts: Counts::default(),
+        checker: None,
+        latency: Default::default(),
+        roles: Vec::new(),
+        ticks: 0,
+        state_hash: hex(0),
+        wall_s: 0.0,
+        oversubscribed: false,
+        trace: None,
+        notes: Vec::new(),
+    }
+}
+
+fn infeasible(frame: RunResult, proof: &Infeasible) -> RunResult {
+    RunResult {
+        outcome: Ending::Infeasible,
+        reason: Some(proof.to_string()),
+        ..frame
+    }
+}
+
+fn complete(frame: RunResult, scene: &Scene, args: &RunArgs, finished: Finished) -> RunResult {
+    let world = &finished.world;
+    let times = Times::new(&world.activities, frame.options.run.settings.tick_ns);
+    let mean = times.as_ref().map(|times| times.mean);
+    let checker = finished.check.as_ref().map(checker);
+    let (outcome, reason) = ending(&finished, checker.as_ref());
+    RunResult {
+        date: bench::machine::date_utc(),
+        outcome,
+        reason,
+        makespan_s: Some(seconds(world.time_ns)),
+        execution_s: mean.map(|mean| mean.moving_s + mean.gripping_s),
+        planning_s: mean.map(|mean| mean.computing_s),
+        waiting_s: mean.map(|mean| mean.waiting_s),
+        idle_s: mean.map(|mean| mean.idle_s),
+        lower_bound_s: lower_bound::lower_bound_s(scene),
+        times,
+        counts: counts(&finished),
+        checker,
+        latency: finished
+            .latency
+            .summaries()
+            .map(|(timed, summary)| (timed.name(), summary))
+            .collect(),
+        roles: finished.roles,
+        ticks: world.ticks,
+        state_hash: hex(world.state_hash),
+        wall_s: finished.wall_s,
+        oversubscribed: finished.oversubscribed,
+        trace: args.trace.as_ref().map(|path| path.display().to_string()),
+        notes: finished.notes,
+        ..frame
+    }
+}
+
+fn counts(finished: &Finished) -> Counts {
+    let world = &finished.world;
+    let mut counts = Counts {
+        hard_constraints: world.hard_constraints,
+        task_failures: world.task_failures,
+        selection_conflicts: world.selection_conflicts,
+        grants_refused: world.grants_refused,
+        deadline_misses: finished.deadline_misses,
+        restarts: finished.restarts,
+        lost_commands: finished.lost_commands,
+        ..Counts::default()
+    };
+    counts.add_work(&finished.work);
+    counts
+}
+
+fn checker(report: &CheckReport) -> Checker {
+    let first = report.violations.iter().take(MOST_QUOTED);
+    Checker {
+        violations: report.violations.len() as u64 + report.unlisted_violations,
+        swept_tests: report.swept_tests,
+        complete: report.complete,
+        first: first.map(ToString::to_string).collect(),
+    }
+}
+
+/// How it ended, in view of what the checker found.
+fn ending(finished: &Finished, checker: Option<&Checker>) -> (Ending, Option<String>) {
+    let reason = finished.reason.clone();
+    let violations = checker.map_or(0, |checker| checker.violations);
+    if violations > 0 {
+        let found = format!("the checker found {violations} violations");
+        return (Ending::Violated, Some(found));
+    }
+    match finished.outcome {
+        RunOutcome::Solved if checker.is_none() => {
+            let reason = "solved, but there is no trace to check".to_owned();
+            (Ending::Failed, Some(reason))
+        }
+        RunOutcome::Solved => (Ending::Solved, reason),
+        RunOutcome::Stuck => (Ending::Stuck, reason),
+        RunOutcome::Timeout => (Ending::Timeout, reason),
+        RunOutcome::Interrupted => (Ending::Interrupted, reason),
+        RunOutcome::Violated => (Ending::Violated, reason),
+        RunOutcome::Running | RunOutcome::Failed => (Ending::Failed, reason),
+    }
+}

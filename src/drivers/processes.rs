@@ -1,0 +1,84 @@
+//! Real processes over shared memory: the supervisor of crate `node` does the work.
+//!
+//! Responsible for: what the supervisor is asked to start, and the check of what it left.
+//! Not responsible for: the processes.
+
+use std::env;
+
+use node::{Launcher, RunError, RunOptions, RunPlan, RunReport, supervisor};
+use scene::Scene;
+
+use crate::drivers::Finished;
+use crate::exit::{Exit, Failure};
+use crate::progress::Progress;
+use crate::result::RoleLine;
+
+/// Runs `scene` to its end as the run called `name`.
+///
+/// # Errors
+/// The run cannot be started.
+pub(crate) fn run(
+    scene: &Scene,
+    name: Option<String>,
+    options: RunOptions,
+    progress: &mut Progress,
+) -> Result<Finished, Failure> {
+    let plan = RunPlan {
+        name,
+        ..plan(scene, options)?
+    };
+    let report = supervisor::run(&plan, progress).map_err(refused)?;
+    let check = report.trace.as_deref().map(trace::check_file).transpose();
+    let mut finished = finished(report);
+    match check {
+        Ok(check) => finished.check = check,
+        Err(error) => finished.notes.push(format!("the trace cannot be checked: {error}")),
+    }
+    Ok(finished)
+}
+
+/// A plan whose roles are this very program.
+///
+/// # Errors
+/// The program cannot find itself.
+pub(crate) fn plan(scene: &Scene, options: RunOptions) -> Result<RunPlan, Failure> {
+    let program = env::current_exe()
+        .map_err(|error| Failure::system(format!("this program cannot find itself: {error}")))?;
+    let launcher = Launcher {
+        program,
+        before: Vec::new(),
+        inherit_stderr: env::var_os("RUST_LOG").is_some(),
+    };
+    Ok(RunPlan::new(
+        scene::to_canonical_toml(scene),
+        options,
+        launcher,
+    ))
+}
+
+/// The failure that a run which could not be started ends in.
+pub(crate) fn refused(error: RunError) -> Failure {
+    let exit = match error {
+        RunError::Options(_) => Exit::Usage,
+        _ => Exit::System,
+    };
+    Failure::new(exit, error)
+}
+
+fn finished(report: RunReport) -> Finished {
+    Finished {
+        outcome: report.outcome,
+        reason: report.reason,
+        world: report.world,
+        work: report.counters,
+        latency: report.latency,
+        roles: report.roles.iter().map(RoleLine::from).collect(),
+        deadline_misses: report.deadline_misses,
+        restarts: report.restarts,
+        lost_commands: report.lost_commands,
+        wall_s: report.wall_s,
+        oversubscribed: report.oversubscribed,
+        notes: report.notes,
+        check: None,
+    }
+}

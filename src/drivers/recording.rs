@@ -1,0 +1,123 @@
+//! The trace of a run in this process, and its check.
+//!
+//! Responsible for: the file: the one asked for, or one without a name that is gone when the
+//! program is; ending a chunk every second of wall time.
+//! Not responsible for: what is in a trace, or what makes it a legal one (crate `trace`).
+
+use std::fs::{self, File};
+use std::io::{self, BufReader, BufWriter, Seek};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use scene::Scene;
+use shm_types::{Checked, MotionBatch, WorldSnapshot};
+use trace::{CheckReport, Ending, SceneRecord, WriteError, Writer};
+
+/// Wall time after which a chunk ends, so that a file cut short has all but the last of it.
+const FLUSH_EVERY: Duration = Duration::from_secs(1);
+
+/// Why there is no trace, or no check of it.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum RecordingError {
+    /// The file cannot be made.
+    #[error("could not make the trace {}: {source}", path.display())]
+    Create {
+        /// Which.
+        path: PathBuf,
+        /// Why not.
+        source: io::Error,
+    },
+    /// The file cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// The file cannot be read again.
+    #[error("could not read the trace back: {0}")]
+    Reread(#[from] io::Error),
+    /// What was written is no trace.
+    #[error("could not check the trace: {0}")]
+    Check(#[from] trace::ReadError),
+}
+
+/// A trace that is being written.
+pub(crate) struct Recording {
+    writer: Writer<BufWriter<File>>,
+    flushed: Instant,
+}
+
+impl Recording {
+    /// Starts a trace at `path`, or in a file without a name.
+    ///
+    /// # Errors
+    /// The file cannot be made or written.
+    pub(crate) fn start(
+        path: Option<&Path>,
+        scene: &SceneRecord,
+        state_every_ns: u64,
+    ) -> Result<Self, RecordingError> {
+        let file = match path {
+            Some(path) => create(path, false)?,
+            None => nameless()?,
+        };
+        Ok(Self {
+            writer: Writer::new(BufWriter::new(file), scene, state_every_ns)?,
+            flushed: Instant::now(),
+        })
+    }
+
+    /// Adds a tick.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(crate) fn tick(
+        &mut self,
+        snapshot: Checked<'_, WorldSnapshot>,
+        motion: &MotionBatch,
+        now: Instant,
+    ) -> Result<(), RecordingError> {
+        self.writer.batch(motion)?;
+        self.writer.snapshot(snapshot)?;
+        if now.duration_since(self.flushed) >= FLUSH_EVERY {
+            self.flushed = now;
+            self.writer.flush()?;
+        }
+        Ok(())
+    }
+
+    /// Ends the trace and checks it.
+    ///
+    /// # Errors
+    /// The file cannot be written, or not read again.
+    pub(crate) fn finish(self, ending: Ending) -> Result<CheckReport, RecordingError> {
+        let mut file = self
+            .writer
+            .finish(ending)?
+            .into_inner()
+            .map_err(io::IntoInnerError::into_error)?;
+        file.rewind()?;
+        Ok(trace::check(BufReader::new(file))?)
+    }
+}
+
+/// A file that has no name any more: nothing is left of it whatever happens.
+fn nameless() -> Result<File, RecordingError> {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let name = format!("rearrange-{}-{}.mcap", std::process::id(), since.as_nanos());
+    let path = std::env::temp_dir().join(name);
+    let file = create(&path, true)?;
+    fs::remove_file(&path).map_err(|source| RecordingError::Create { path, source })?;
+    Ok(file)
+}
+
+fn create(path: &Path, new: bool) -> Result<File, RecordingError> {
+    let mut options = File::options();
+    options.read(true).write(true);
+    if new {
+        options.create_new(true);
+    } else {
+        options.create(true).truncate(true);
+    }
+    options.open(path).map_err(|source| RecordingError::Create {
+        path: path.to_owned(),
+        source,
+    })
+}

@@ -1,0 +1,89 @@
+//! Finding a scenario: a file of the user's, or one inside the binary.
+//!
+//! Responsible for: which of the two a name means; reading it; cutting it to the robots asked for.
+//! Not responsible for: what a scenario may say (crate `scene`).
+
+use std::path::Path;
+
+use scene::{BUILTIN, Scene};
+
+use crate::exit::{Exit, Failure};
+
+/// The scenario that is run if none is named.
+pub(crate) const DEFAULT: &str = "e1";
+
+/// Reads the scenario called `name`, with its first `robots` robots if that is given.
+///
+/// A built-in scenario goes by its name, unless that looks like a path: `./paper-68a` and
+/// `paper-68a.toml` are files.
+///
+/// # Errors
+/// There is none, it is no good, or it has fewer homes than robots asked for.
+pub(crate) fn load(name: &str, robots: Option<u32>) -> Result<Scene, Failure> {
+    let scene = match scene::builtin(name) {
+        Some(builtin) => parse(builtin.text, &format!("built-in {name}"))?,
+        None => parse(&read(name)?, name)?,
+    };
+    match robots {
+        None => Ok(scene),
+        Some(robots) => cut(&scene, robots),
+    }
+}
+
+fn parse(text: &str, source: &str) -> Result<Scene, Failure> {
+    scene::parse(text, source).map_err(|error| Failure {
+        exit: Exit::BadInput,
+        report: error.into(),
+    })
+}
+
+fn read(name: &str) -> Result<String, Failure> {
+    std::fs::read_to_string(name).map_err(|error| {
+        let known = if !looks_like_path(name) {
+            let names: Vec<_> = BUILTIN.iter().map(|builtin| builtin.name).collect();
+            format!("; built-in scenarios are {}", names.join(", "))
+        } else {
+            String::new()
+        };
+        Failure::new(
+            Exit::BadInput,
+            format!("the scenario {name} cannot be read: {error}{known}"),
+        )
+    })
+}
+
+fn looks_like_path(name: &str) -> bool {
+    name.contains('/') || Path::new(name).extension().is_some()
+}
+
+fn cut(scene: &Scene, robots: u32) -> Result<Scene, Failure> {
+    let homes = scene.homes.len();
+    if robots as usize > homes {
+        return Err(Failure::new(
+            Exit::Usage,
+            format!(
+                "--robots {robots} is more than {} has homes for: allowed are 1 to {homes}",
+                scene.name
+            ),
+        ));
+    }
+    scene
+        .with_robots(robots as usize)
+        .map_err(|problems| Failure::new(Exit::BadInput, problems))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_is_inside_the_binary() {
+        assert!(load(DEFAULT, None).is_ok());
+    }
+
+    #[test]
+    fn robots_beyond_the_homes_are_a_usage_error() {
+        let failure = load(DEFAULT, Some(128)).unwrap_err();
+        assert_eq!(failure.exit, Exit::Usage);
+    }
+}
