@@ -109,14 +109,27 @@ pub(crate) fn all_normals(a: &Region, b: &Region, mut test: impl FnMut(Vec2) -> 
 
 /// Whether two regions overlap.
 pub(crate) fn regions_overlap(a: &Region, b: &Region) -> bool {
-    let apart = a.at - b.at;
     let radius = a.shape.radius() + b.shape.radius();
     if radius > 0.0 {
         return extents_meet(a, b) && core_distance(a, b) < radius - CONTACT_M;
     }
-    all_normals(a, b, |normal| {
-        a.support(normal) + b.support(-normal) + apart.dot(&normal) > CONTACT_M
-    })
+    let apart = a.at - b.at;
+    let overlaps_along =
+        |normal: Vec2| a.support(normal) + b.support(-normal) + apart.dot(&normal) > CONTACT_M;
+    match (a.shape.half_box(), b.shape.half_box()) {
+        (Some(a_half), Some(b_half)) => {
+            // The axis directions at once, which settles it but for slanted sweeps.
+            let room = a_half + b_half + (a.along.abs() + b.along.abs()) / 2.0;
+            let between = (apart + (a.along - b.along) / 2.0).abs();
+            between.x < room.x - CONTACT_M
+                && between.y < room.y - CONTACT_M
+                && [a.sweep_normal(), b.sweep_normal()]
+                    .into_iter()
+                    .flatten()
+                    .all(|normal| overlaps_along(normal) && overlaps_along(-normal))
+        }
+        _ => all_normals(a, b, overlaps_along),
+    }
 }
 
 fn extents_meet(a: &Region, b: &Region) -> bool {

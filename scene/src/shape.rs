@@ -185,6 +185,7 @@ impl Shape {
 
     /// Half widths, if it is a box.
     #[must_use]
+    #[inline]
     pub fn half_box(&self) -> Option<Vec2> {
         match self.kind {
             Kind::Box { half } => Some(half),
@@ -237,6 +238,7 @@ impl Shape {
     }
 
     /// Radius of the disc its core is swept with: 0 for all but circles.
+    #[inline]
     pub(crate) fn radius(&self) -> f64 {
         match self.kind {
             Kind::Circle { radius } => radius,
