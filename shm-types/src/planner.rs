@@ -115,6 +115,15 @@ pub struct PlannerReport {
 }
 
 impl ConstraintTable {
+    /// The empty table of version 0, which stands for "nothing published yet". It is complete for
+    /// no event.
+    #[must_use]
+    pub fn none() -> Box<Self> {
+        let mut table = crate::zeroed::<Self>();
+        table.complete_for_events = u64::MAX;
+        table
+    }
+
     /// The live constraints.
     #[must_use]
     pub fn constraints(&self) -> &[Constraint] {

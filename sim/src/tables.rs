@@ -22,10 +22,8 @@ pub(crate) struct Tables {
 impl Tables {
     /// Nothing published yet.
     pub(crate) fn new() -> Self {
-        let mut empty: Box<ConstraintTable> = zeroed();
-        empty.complete_for_events = u64::MAX;
         Self {
-            empty,
+            empty: ConstraintTable::none(),
             kept: std::array::from_fn(|_| zeroed()),
             newest: None,
         }
