@@ -90,14 +90,33 @@ fn the_count_counts() {
 fn complete_runs_allocate_nothing() {
     let scene = scene("h1");
     for &method in Method::ALL {
-        let settings = Settings { method, ..Settings::default() };
+        let settings = Settings {
+            method,
+            ..Settings::default()
+        };
         let report = run(&scene, &settings);
-        assert_eq!(report.outcome, Outcome::Solved, "{method}: {:?}", report.reason);
+        assert_eq!(
+            report.outcome,
+            Outcome::Solved,
+            "{method}: {:?}",
+            report.reason
+        );
         let counters = report.counters();
-        assert!(counters.selections > 0 && counters.path_plans > 0, "{method}");
-        assert_eq!(counters.easy_constraints > 0, method.uses_easy(), "{method}");
-        assert_eq!(report.hard_constraints > 0, method != Method::NoAction, "{method}");
-        assert_eq!(report.world.task_failures > 0, method != Method::All, "{method}");
+        assert!(
+            counters.selections > 0 && counters.path_plans > 0,
+            "{method}"
+        );
+        assert_eq!(counters.polygon_tests > 0, method.uses_easy(), "{method}");
+        assert_eq!(
+            report.hard_constraints > 0,
+            method != Method::NoAction,
+            "{method}"
+        );
+        assert_eq!(
+            report.world.task_failures > 0,
+            method != Method::All,
+            "{method}"
+        );
     }
 }
 
@@ -112,6 +131,11 @@ fn computations_over_many_steps_allocate_nothing() {
             ..Settings::default()
         };
         let report = run(&scene, &settings);
-        assert_eq!(report.outcome, Outcome::Solved, "{hard}: {:?}", report.reason);
+        assert_eq!(
+            report.outcome,
+            Outcome::Solved,
+            "{hard}: {:?}",
+            report.reason
+        );
     }
 }

@@ -17,7 +17,10 @@ fn shipped(name: &str) -> Scene {
 }
 
 fn with(method: Method) -> Settings {
-    Settings { method, ..Settings::default() }
+    Settings {
+        method,
+        ..Settings::default()
+    }
 }
 
 /// Runs to the end; checks what must hold of every run.
@@ -32,7 +35,12 @@ fn run(scene: &Scene, settings: &Settings) -> SimReport {
         ControlFlow::Continue(())
     };
     let report = Simulation::new(scene, settings, 1).run(&mut watch);
-    let who = format!("{} × {} × {}", scene.name, scene.homes.len(), settings.method);
+    let who = format!(
+        "{} × {} × {}",
+        scene.name,
+        scene.homes.len(),
+        settings.method
+    );
     assert_eq!(report.world.violations, 0, "{who}: {:?}", report.reason);
     assert_eq!(report.world.selection_conflicts, 0, "{who}");
     assert_eq!(report.world.invalid_requests, 0, "{who}");
@@ -76,7 +84,11 @@ fn rooms_that_the_methods_can_finish_are_finished() {
             let scene = scene.with_robots(robots).unwrap();
             for &method in Method::ALL {
                 let report = run(&scene, &with(method));
-                assert_eq!(report.outcome, Outcome::Solved, "{name} × {robots} × {method}");
+                assert_eq!(
+                    report.outcome,
+                    Outcome::Solved,
+                    "{name} × {robots} × {method}"
+                );
             }
         }
     }
@@ -110,10 +122,20 @@ fn slow_computers_find_the_same_and_stand_still_for_it() {
     let scene = shipped("h1");
     for &method in Method::ALL {
         let fast = run(&scene, &with(method));
-        let slow = run(&scene, &Settings { units_per_second: 5_000, ..with(method) });
+        let slow = run(
+            &scene,
+            &Settings {
+                units_per_second: 5_000,
+                ..with(method)
+            },
+        );
         assert_eq!(slow.outcome, Outcome::Solved, "{method}");
         let computing = |report: &SimReport| -> u64 {
-            report.robots.iter().map(|robot| robot.times.ticks(Activity::Computing)).sum()
+            report
+                .robots
+                .iter()
+                .map(|robot| robot.times.ticks(Activity::Computing))
+                .sum()
         };
         assert!(computing(&slow) > 100 * computing(&fast).max(1), "{method}");
         assert!(slow.time_ns > fast.time_ns, "{method}");
@@ -123,8 +145,14 @@ fn slow_computers_find_the_same_and_stand_still_for_it() {
 #[test]
 fn one_computer_for_all_is_slower_than_one_each() {
     let scene = shipped("h1");
-    let own = Settings { units_per_second: 20_000, ..with(Method::All) };
-    let shared = Settings { compute: scene::Compute::Shared, ..own.clone() };
+    let own = Settings {
+        units_per_second: 20_000,
+        ..with(Method::All)
+    };
+    let shared = Settings {
+        compute: scene::Compute::Shared,
+        ..own.clone()
+    };
     assert!(run(&scene, &shared).time_ns > run(&scene, &own).time_ns);
 }
 
@@ -175,7 +203,12 @@ fn restarted_robots_take_up_where_they_were() {
             }
         }
         let report = simulation.report();
-        assert_eq!(report.outcome, Outcome::Solved, "every {every} ticks: {:?}", report.reason);
+        assert_eq!(
+            report.outcome,
+            Outcome::Solved,
+            "every {every} ticks: {:?}",
+            report.reason
+        );
         assert_eq!(report.world.selection_conflicts, 0);
     }
 }

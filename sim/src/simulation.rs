@@ -10,8 +10,8 @@ use robot::{Robot, RobotInput};
 use scene::{Scene, Settings};
 use shm_types::capacity::MAX_ROBOTS;
 use shm_types::{
-    Checked, Command, ControlKind, ControlRequest, Counts, HardAnswer, HardRequest, Invalid,
-    MotionBatch, Outcome, PlannerReport, RoleKind, Validate, WorldSnapshot, zeroed,
+    Checked, Command, ControlKind, ControlRequest, Counts, EventKind, HardAnswer, HardRequest,
+    Invalid, MotionBatch, Outcome, PlannerReport, RoleKind, Validate, WorldSnapshot, zeroed,
 };
 use world::{FIRST_INCARNATION, World, WorldInput};
 
@@ -52,6 +52,8 @@ pub struct Simulation<'s> {
     answers: Vec<Option<HardAnswer>>,
     /// What the planner has published.
     tables: Tables,
+    /// Hard constraints that came into force so far.
+    constraints_found: u64,
     /// What the world is told in the next step.
     control: Vec<ControlRequest>,
     control_id: u64,
@@ -83,6 +85,7 @@ impl<'s> Simulation<'s> {
             staged: Vec::with_capacity(robots),
             answers: vec![None; robots],
             tables: Tables::new(),
+            constraints_found: 0,
             control: Vec::with_capacity(robots + 1),
             control_id: 0,
             settings: settings.clone(),
@@ -211,6 +214,9 @@ impl<'s> Simulation<'s> {
         self.world.step(self.scene, input, &mut self.motion);
         self.control.clear();
         self.world.snapshot_into(&mut self.snapshot);
+        let found = self.motion.events().iter();
+        let found = found.filter(|event| event.kind == EventKind::Constraint.code());
+        self.constraints_found += found.count() as u64;
     }
 
     /// What the machines know now.
@@ -233,7 +239,7 @@ impl<'s> Simulation<'s> {
             world: *self.world.counters(),
             robots: robots.collect(),
             planner: self.report.counters,
-            hard_constraints: self.tables.newest().map_or(0, |table| table.count),
+            hard_constraints: self.constraints_found,
         }
     }
 
