@@ -158,10 +158,9 @@ impl Occupancy {
         if own & POINT != 0 {
             return 0;
         }
-        let column = cell % self.width;
-        // Off the lattice everything is blocked; the fence already blocks steps that leave it
-        // to the east and the north.
-        let west = if column > 0 { bits[here - 1] } else { u8::MAX };
+        // Steps that leave the lattice to the east and the north are blocked. So at the start of
+        // a row, where the byte before belongs to the end of another, that byte says so too.
+        let west = if here > 0 { bits[here - 1] } else { u8::MAX };
         let south = if here >= width {
             bits[here - width]
         } else {

@@ -46,11 +46,14 @@ pub(crate) struct Raster {
     pub(crate) bits: Vec<u8>,
 }
 
-/// A side: robot centres `r` with `normal · r < bound` are on its inner side.
-#[derive(Clone, Copy)]
+/// A slanted side of a Minkowski difference: in the row at `y` it is crossed at
+/// `offset - slope * y`.
+#[derive(Clone, Copy, Default)]
 struct Side {
-    normal: Vec2,
-    bound: f64,
+    offset: f64,
+    slope: f64,
+    /// Whether the inside is to the left (smaller x) of it.
+    inside_left: bool,
 }
 
 /// Half-planes whose intersection is blocked: a box, and the sides that are not along an axis.
@@ -276,10 +279,7 @@ impl Blocked {
         let mut blocked = Self {
             low: Vec2::zeros(),
             high: Vec2::zeros(),
-            sides: [Side {
-                normal: Vec2::zeros(),
-                bound: 0.0,
-            }; MAX_SIDES],
+            sides: [Side::default(); MAX_SIDES],
             count: 0,
         };
         let apart = obstacle.at - part.at;
@@ -300,10 +300,12 @@ impl Blocked {
                 } else {
                     blocked.high.y = room;
                 }
-            } else if blocked.count < MAX_SIDES {
+            } else {
+                // (−normal) · r < room, solved for x.
                 blocked.sides[blocked.count] = Side {
-                    normal: -normal,
-                    bound: room,
+                    offset: -room / normal.x,
+                    slope: normal.y / normal.x,
+                    inside_left: normal.x < 0.0,
                 };
                 blocked.count += 1;
             }
@@ -317,8 +319,8 @@ impl Blocked {
     fn run(&self, y: f64) -> (f64, f64) {
         let (mut low, mut high) = (self.low.x, self.high.x);
         for side in &self.sides[..self.count] {
-            let x = (side.bound - side.normal.y * y) / side.normal.x;
-            if side.normal.x > 0.0 {
+            let x = side.offset - side.slope * y;
+            if side.inside_left {
                 high = high.min(x);
             } else {
                 low = low.max(x);

@@ -152,15 +152,19 @@ impl Plan {
         (0..top).filter(|y| !covered(*y)).count() as i32
     }
 
-    /// Takes exactly so many squares off the free floor: a strip along the right side.
+    /// Takes exactly so many squares off the free floor, by a strip along the right side; false if
+    /// that cannot be.
     fn fill(&mut self, excess: i32) -> bool {
         if excess == 0 {
             return true;
         }
         let x = self.size.0 - 1;
         let top = (1..=self.size.1).find(|top| self.free_in_column(x, *top) == excess);
-        self.walls.extend(top.map(|top| [x, 0, x + 1, top]));
-        top.is_some()
+        let Some(top) = top else { return false };
+        let strip = [x, 0, x + 1, top];
+        self.walls.push(strip);
+        // A doorway at the far right would become too narrow.
+        !self.doors.iter().any(|door| touch(door, &strip))
     }
 }
 
