@@ -102,3 +102,54 @@ pub(crate) fn settle(
 pub(crate) fn report<'a>(planner: Option<Checked<'a, PlannerReport>>) -> Option<&'a PlannerReport> {
     planner.map(Checked::get)
 }
+
+#[cfg(test)]
+mod tests {
+    use shm_types::ControlKind;
+
+    use super::*;
+    use crate::testing::{BELOW, Bench, room};
+
+    fn bench() -> Bench {
+        let homes = [[1.0, 1.0], [4.0, 1.0], [8.0, 1.0]];
+        Bench::new(room(&homes, &[], BELOW, ""))
+    }
+
+    fn activities(bench: &Bench) -> [Activity; 3] {
+        [0, 1, 2].map(|i| Activity::decode(bench.robot(i).activity).unwrap())
+    }
+
+    #[test]
+    fn what_a_robot_did_decides_before_what_it_says() {
+        use Activity::{Computing, Idle, Moving, Waiting};
+        let mut bench = bench();
+        bench.ask(0, &[[2.0, 1.0]]);
+        bench.commands[0].activity = Idle.code();
+        bench.commands[1].activity = Computing.code();
+        bench.commands[2].activity = Moving.code();
+        bench.step();
+        assert_eq!(activities(&bench), [Moving, Computing, Waiting]);
+        bench.tell(ControlKind::Down, 1, 1);
+        bench.tell(ControlKind::Hold, 0, 0);
+        bench.step();
+        assert_eq!(activities(&bench), [Waiting, Idle, Waiting]);
+        assert_eq!(bench.world.times(0).ticks(Moving), 1);
+        assert_eq!(bench.world.times(0).ticks(Waiting), 1);
+    }
+
+    #[test]
+    fn those_that_wait_for_an_answer_share_no_computer() {
+        let mut bench = bench();
+        for command in &mut bench.commands {
+            command.activity = Activity::Computing.code();
+        }
+        bench.commands[1].phase = Phase::Failing.code();
+        bench.planner.busy = 1;
+        bench.step();
+        assert_eq!(bench.header().busy, 3, "two robots and the planner");
+        bench.planner.busy = 0;
+        bench.silent = vec![true; 3];
+        bench.steps(20);
+        assert_eq!(bench.header().busy, 0, "nor those that are silent");
+    }
+}

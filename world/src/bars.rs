@@ -129,3 +129,125 @@ impl World {
 fn stands(robot: &Robot) -> bool {
     !robot.moved && robot.grant.is_empty()
 }
+
+#[cfg(test)]
+mod tests {
+    use shm_types::{Claim, FailureCause, NONE};
+
+    use crate::testing::{BELOW, Bench, room};
+
+    const ROBOTS: [[f64; 2]; 3] = [[1.0, 1.0], [4.0, 1.0], [8.0, 1.0]];
+    const OBJECTS: [[[f64; 2]; 2]; 2] = [[[4.0, 1.45], [4.0, 5.0]], [[6.0, 3.0], [6.0, 5.0]]];
+
+    fn bench() -> Bench {
+        Bench::new(room(&ROBOTS, &OBJECTS, BELOW, ""))
+    }
+
+    fn is_barred(bench: &Bench, robot: usize, task: usize) -> bool {
+        bench.object(task).barred[robot / 64] >> (robot % 64) & 1 == 1
+    }
+
+    fn fail_for_robots(bench: &mut Bench, blocker: u32) {
+        bench.fail(0, 1, FailureCause::Robots, blocker);
+        bench.step();
+    }
+
+    #[test]
+    fn a_failure_caused_by_objects_bars_until_the_next_grasp() {
+        let mut bench = bench();
+        bench.claim(1, 0);
+        bench.fail(0, 1, FailureCause::Objects, NONE);
+        bench.step();
+        assert!(is_barred(&bench, 0, 1) && !is_barred(&bench, 1, 1));
+        assert_eq!(bench.object(1).epoch_barred, bench.object(1).barred);
+        bench.claim(0, 1);
+        bench.claim(1, 0);
+        bench.step();
+        assert_eq!(bench.robot(0).task, NONE, "barred");
+        let epoch = bench.header().epoch;
+        bench.grasp(1);
+        assert!(!is_barred(&bench, 0, 1));
+        assert_eq!(bench.header().epoch, epoch + 1, "robot 0 may select it now");
+        assert_eq!(bench.object(1).epoch_barred, [0; 2]);
+        bench.claim(0, 1);
+        bench.step();
+        assert_eq!(bench.robot(0).task, 1);
+    }
+
+    #[test]
+    fn a_lifted_bar_of_a_busy_robot_opens_no_epoch() {
+        let mut bench = bench();
+        bench.fail(0, 1, FailureCause::Objects, NONE);
+        bench.step();
+        bench.claim(0, 0);
+        bench.step();
+        assert_eq!(bench.robot(0).task, 0);
+        let epoch = bench.header().epoch;
+        bench.commands[0].claim = Claim::NONE;
+        bench.claim(1, 0);
+        bench.step();
+        bench.claim(2, 1);
+        bench.step();
+        // Robot 0 is idle, but its task is about to be done by another: still open.
+        bench.grasp(1);
+        assert_eq!(bench.header().epoch, epoch + 1);
+        bench.claim(0, 1);
+        bench.fail(1, 0, FailureCause::Objects, NONE);
+        bench.step();
+        let epoch = bench.header().epoch;
+        bench.release(1);
+        assert_eq!(
+            bench.header().epoch,
+            epoch + 1,
+            "a release opens one anyway"
+        );
+    }
+
+    #[test]
+    fn only_the_last_of_the_failures_caused_by_robots_bars() {
+        let mut bench = bench();
+        fail_for_robots(&mut bench, 2);
+        fail_for_robots(&mut bench, 2);
+        assert!(!is_barred(&bench, 0, 1));
+        fail_for_robots(&mut bench, 2);
+        assert!(is_barred(&bench, 0, 1));
+        assert_eq!(bench.world.counters().task_failures, 3);
+    }
+
+    #[test]
+    fn it_goes_when_the_blocker_is_parked_elsewhere_but_not_twice() {
+        let mut bench = bench();
+        for _ in 0..3 {
+            fail_for_robots(&mut bench, 2);
+        }
+        let epoch = bench.header().epoch;
+        bench.ask(2, &[[8.0, 3.0]]);
+        bench.steps(100);
+        assert!(is_barred(&bench, 0, 1), "still on its way");
+        bench.steps(400);
+        assert!(!is_barred(&bench, 0, 1));
+        assert_eq!(bench.header().epoch, epoch + 1);
+        fail_for_robots(&mut bench, 2);
+        assert!(is_barred(&bench, 0, 1));
+        bench.drive(2, &[[8.0, 1.0]]);
+        bench.steps(5);
+        assert!(is_barred(&bench, 0, 1), "now only a placement lifts it");
+        bench.claim(1, 0);
+        bench.step();
+        bench.grasp(1);
+        assert!(!is_barred(&bench, 0, 1));
+        fail_for_robots(&mut bench, 2);
+        assert!(!is_barred(&bench, 0, 1), "counting begins anew");
+    }
+
+    #[test]
+    fn a_blocker_that_stays_keeps_its_bar() {
+        let mut bench = bench();
+        for _ in 0..3 {
+            fail_for_robots(&mut bench, 2);
+        }
+        bench.drive(1, &[[4.5, 1.0]]);
+        bench.steps(5);
+        assert!(is_barred(&bench, 0, 1));
+    }
+}

@@ -75,3 +75,90 @@ impl World {
         self.constraints.tell(journal);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use shm_types::capacity::MAX_CONSTRAINTS;
+    use shm_types::{Constraint, ConstraintKind, ConstraintTable, EventKind};
+
+    use crate::testing::{BELOW, Bench, room};
+
+    fn table(version: u32, effect_tick: u64, pairs: &[(u32, u32)]) -> Box<ConstraintTable> {
+        let mut table: Box<ConstraintTable> = shm_types::zeroed();
+        (table.version, table.effect_tick) = (version, effect_tick);
+        table.count = pairs.len() as u32;
+        for (constraint, &(before, after)) in table.constraints.iter_mut().zip(pairs) {
+            *constraint = Constraint {
+                before,
+                after,
+                kind: ConstraintKind::H1.code(),
+            };
+        }
+        table
+    }
+
+    fn bench() -> Bench {
+        let objects = [1.0, 3.0, 5.0].map(|x| [[x, 3.0], [x, 5.0]]);
+        Bench::new(room(&[[1.0, 1.0]], &objects, BELOW, ""))
+    }
+
+    #[test]
+    fn a_new_version_opens_an_epoch_that_uses_it_and_tells_what_is_new() {
+        let mut bench = bench();
+        bench.table = Some(table(1, 0, &[(0, 1)]));
+        bench.steps(3);
+        assert_eq!(
+            (bench.header().epoch, bench.header().constraints_version),
+            (2, 1)
+        );
+        assert_eq!(bench.header().epoch_constraints_version, 1);
+        assert_eq!(bench.header().placements, 1);
+        bench.table = Some(table(2, 0, &[(0, 1), (2, 1)]));
+        bench.step();
+        let told = bench.events(EventKind::Constraint);
+        assert_eq!(told.len(), 1, "the other was told before");
+        assert_eq!((told[0].task, told[0].other), (2, 1));
+        assert_eq!(told[0].value, u64::from(ConstraintKind::H1.code()));
+        assert_eq!(bench.header().epoch, 3);
+    }
+
+    #[test]
+    fn no_version_comes_into_force_before_the_tick_it_names_nor_back() {
+        let mut bench = bench();
+        bench.table = Some(table(4, 5, &[(0, 1)]));
+        for tick in 1..=7 {
+            bench.step();
+            let expected = if tick < 5 { 0 } else { 4 };
+            assert_eq!(bench.header().constraints_version, expected, "tick {tick}");
+        }
+        bench.table = Some(table(3, 0, &[]));
+        bench.step();
+        assert_eq!(bench.header().constraints_version, 4);
+    }
+
+    #[test]
+    fn a_table_too_large_for_one_batch_is_told_over_several() {
+        let objects: Vec<_> = (0..140)
+            .map(|i| {
+                let (x, y) = (
+                    0.3 + 0.45 * f64::from(i % 20),
+                    1.5 + 0.45 * f64::from(i / 20),
+                );
+                [[x, y], [x, y + 0.01]]
+            })
+            .collect();
+        let mut bench = Bench::new(room(&[[1.0, 1.0]], &objects, BELOW, ""));
+        let pairs: Vec<_> = (0..140)
+            .flat_map(|a| (0..140).filter(move |b| a != *b).map(move |b| (a, b)))
+            .take(MAX_CONSTRAINTS)
+            .collect();
+        bench.table = Some(table(1, 0, &pairs));
+        let mut told = Vec::new();
+        for _ in 0..30 {
+            bench.step();
+            let found = bench.events(EventKind::Constraint);
+            told.extend(found.iter().map(|event| (event.task, event.other)));
+        }
+        assert_eq!(told, pairs);
+    }
+}

@@ -114,3 +114,169 @@ impl World {
         journal.event(Event::new(kind));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use shm_types::{Claim, ControlKind, EventKind, Grip, NONE, Outcome, RoleKind, TaskStatus};
+
+    use super::*;
+    use crate::testing::{BELOW, Bench, room};
+
+    const OBJECTS: [[[f64; 2]; 2]; 2] = [[[1.0, 1.45], [1.0, 5.0]], [[5.0, 3.0], [5.0, 5.0]]];
+
+    fn bench(more: &str) -> Bench {
+        Bench::new(room(&[[1.0, 1.0], [1.0, 0.5]], &OBJECTS, BELOW, more))
+    }
+
+    #[test]
+    fn a_robot_that_is_gone_stays_where_it_is_as_an_obstacle() {
+        let mut bench = Bench::new(room(&[[1.0, 1.0], [3.0, 1.0]], &[], BELOW, ""));
+        bench.claim(0, 0);
+        bench.ask(0, &[[9.0, 1.0]]);
+        bench.step();
+        bench.tell(ControlKind::Down, 0, 1);
+        bench.step();
+        assert_eq!(bench.events(EventKind::RobotDown).len(), 1);
+        let robot = bench.robot(0);
+        assert_eq!(
+            (robot.live, robot.grant_count, robot.request_open),
+            (0, 0, 0)
+        );
+        assert_eq!((robot.task, robot.epoch_free), (NONE, 0));
+        assert_eq!(bench.object(0).status, TaskStatus::Waiting.code());
+        assert_eq!(bench.header().epoch, 2);
+        bench.ask(1, &[[0.5, 1.0]]);
+        bench.steps(600);
+        let gap_m = bench.at(1)[0] - bench.at(0)[0] - 0.5;
+        assert!(
+            (-1e-9..1e-3).contains(&gap_m),
+            "its path is free, its place is not: {gap_m}"
+        );
+    }
+
+    #[test]
+    fn what_a_robot_holds_it_holds_on_to() {
+        let mut bench = bench("release_s = 1.0");
+        bench.claim(0, 0);
+        bench.step();
+        bench.grasp(0);
+        bench.grip(0, Grip::Release);
+        bench.step();
+        bench.tell(ControlKind::Down, 0, 1);
+        bench.steps(200);
+        assert_eq!((bench.robot(0).holding, bench.object(0).holder), (0, 0));
+        bench.tell(ControlKind::Up, 0, 2);
+        bench.commands[0].incarnation = 2;
+        bench.commands[0].claim = Claim::NONE;
+        bench.grip(0, Grip::Keep);
+        bench.step();
+        assert_eq!(bench.robot(0).task, 0, "it takes up where it was");
+    }
+
+    #[test]
+    fn an_unfinished_grasp_leaves_the_object_on_the_ground() {
+        let mut bench = bench("grasp_s = 1.0");
+        bench.claim(0, 0);
+        bench.step();
+        bench.grip(0, Grip::Grasp);
+        bench.step();
+        bench.tell(ControlKind::Down, 0, 1);
+        bench.steps(200);
+        assert_eq!(
+            (bench.robot(0).holding, bench.object(0).holder),
+            (NONE, NONE)
+        );
+        assert_eq!(bench.object(0).status, TaskStatus::Waiting.code());
+    }
+
+    #[test]
+    fn only_the_incarnation_that_is_up_is_listened_to() {
+        let mut bench = bench("");
+        bench.tell(ControlKind::Down, 1, 1);
+        bench.ask(1, &[[8.0, 0.5]]);
+        bench.steps(5);
+        assert_eq!(bench.at(1), [1.0, 0.5], "gone");
+        bench.tell(ControlKind::Up, 1, 2);
+        bench.steps(5);
+        let up = bench.robot(1);
+        assert_eq!((up.live, up.incarnation, up.acknowledged), (1, 2, 0));
+        assert_eq!(bench.at(1), [1.0, 0.5], "the old one speaks");
+        bench.commands[1].incarnation = 2;
+        bench.commands[1].sequence = 0;
+        bench.steps(5);
+        assert!(bench.at(1)[0] > 1.0);
+        assert_eq!(bench.robot(1).acknowledged, 5);
+    }
+
+    #[test]
+    fn being_up_already_changes_nothing() {
+        let mut bench = bench("");
+        bench.steps(2);
+        let (epoch, change) = (bench.header().epoch, bench.header().change);
+        bench.tell(ControlKind::Up, 0, FIRST_INCARNATION);
+        bench.step();
+        assert_eq!(
+            (bench.header().epoch, bench.header().change),
+            (epoch, change)
+        );
+    }
+
+    #[test]
+    fn holding_stops_all_motion_until_resumed() {
+        let mut bench = bench("grasp_s = 0.05");
+        bench.ask(1, &[[8.0, 0.5]]);
+        bench.claim(0, 0);
+        bench.step();
+        bench.grip(0, Grip::Grasp);
+        bench.step();
+        bench.tell(ControlKind::Hold, 0, 0);
+        bench.step();
+        assert_eq!(bench.events(EventKind::Held).len(), 1);
+        let at = bench.at(1);
+        bench.steps(50);
+        assert_eq!((bench.header().held, bench.at(1)), (1, at));
+        assert_eq!(bench.robot(0).holding, NONE, "grips hold too");
+        assert_eq!(bench.world.outcome(), Outcome::Running);
+        bench.tell(ControlKind::Resume, 0, 0);
+        bench.steps(4);
+        assert_eq!(bench.robot(0).holding, 0);
+        assert!((bench.at(1)[0] - at[0] - 0.02).abs() < 1e-9);
+    }
+
+    #[test]
+    fn stopping_ends_the_run() {
+        let mut bench = bench("");
+        bench.tell(ControlKind::Stop, 0, 0);
+        bench.step();
+        assert_eq!(bench.header().outcome, Outcome::Interrupted.code());
+        assert_eq!(bench.events(EventKind::Ended).len(), 1);
+        let tick = bench.header().tick;
+        bench.ask(0, &[[1.0, 3.0]]);
+        bench.steps(3);
+        assert_eq!((bench.header().tick, bench.at(0)), (tick, [1.0, 1.0]));
+        assert!(
+            bench.batch.events().is_empty(),
+            "and nothing happens any more"
+        );
+    }
+
+    #[test]
+    fn replies_say_from_which_tick_on() {
+        let mut bench = bench("");
+        bench.steps(3);
+        let request = |kind: ControlKind, index, incarnation| ControlRequest {
+            id: 9,
+            kind: kind.code(),
+            role: RoleKind::Robot.code(),
+            index,
+            incarnation,
+        };
+        let reply = bench.world.reply_to(&request(ControlKind::Up, 0, 2));
+        assert_eq!((reply.id, reply.effect_tick, reply.accepted), (9, 4, 1));
+        let old = request(ControlKind::Up, 0, 0);
+        let unknown = request(ControlKind::Down, 7, 1);
+        for refused in [old, unknown] {
+            assert_eq!(bench.world.reply_to(&refused).accepted, 0);
+        }
+    }
+}

@@ -64,3 +64,60 @@ impl World {
         journal.event(Event::new(EventKind::Epoch).value(self.epoch.number));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use shm_types::{EventKind, FailureCause, Grip, NONE, Point, TaskStatus};
+
+    use crate::testing::{BELOW, Bench, room};
+
+    const OBJECTS: [[[f64; 2]; 2]; 2] = [[[1.0, 1.45], [1.0, 5.0]], [[5.0, 3.0], [5.0, 5.0]]];
+
+    fn bench(more: &str) -> Bench {
+        Bench::new(room(&[[1.0, 1.0], [8.0, 1.0]], &OBJECTS, BELOW, more))
+    }
+
+    #[test]
+    fn what_selection_reads_is_frozen_until_the_next_epoch() {
+        let mut bench = bench("");
+        bench.step();
+        assert_eq!(
+            bench.events(EventKind::Epoch)[0].value,
+            1,
+            "epoch 1 opens at once"
+        );
+        bench.claim(0, 0);
+        bench.drive(1, &[[8.0, 2.0]]);
+        bench.grasp(0);
+        assert_eq!(bench.header().epoch, 1, "neither start nor grasp opens one");
+        assert_eq!(bench.robot(1).epoch_position, Point::new(8.0, 1.0));
+        assert_eq!(bench.robot(0).epoch_free, 1);
+        assert_eq!(bench.object(0).epoch_status, TaskStatus::Waiting.code());
+        bench.fail(1, 1, FailureCause::Objects, NONE);
+        bench.step();
+        assert_eq!(bench.header().epoch, 2);
+        assert_eq!(bench.events(EventKind::Epoch)[0].value, 2);
+        assert_eq!(bench.robot(1).epoch_position, Point::new(8.0, 2.0));
+        assert_eq!(
+            (bench.robot(0).epoch_free, bench.robot(1).epoch_free),
+            (0, 1)
+        );
+        assert_eq!(bench.object(0).epoch_status, TaskStatus::Held.code());
+        assert_eq!(bench.object(1).epoch_barred, [0b10, 0]);
+    }
+
+    #[test]
+    fn a_closing_grip_counts_as_held() {
+        let mut bench = bench("grasp_s = 1.0");
+        bench.claim(0, 0);
+        bench.step();
+        bench.grip(0, Grip::Grasp);
+        bench.step();
+        bench.fail(1, 1, FailureCause::Objects, NONE);
+        bench.step();
+        assert_eq!((bench.header().epoch, bench.robot(0).holding), (2, NONE));
+        assert_eq!(bench.object(0).epoch_status, TaskStatus::Held.code());
+        assert_eq!(bench.object(0).status, TaskStatus::Claimed.code());
+        assert_eq!(bench.robot(0).epoch_free, 0);
+    }
+}

@@ -168,3 +168,187 @@ impl World {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use scene::Scene;
+    use shm_types::{Activity, ControlKind, EventKind, Grip, NONE, TaskStatus};
+
+    use crate::testing::{BELOW, Bench, room};
+
+    const FAR: [[f64; 2]; 2] = [[1.0, 1.45], [5.0, 5.0]];
+
+    /// A robot that stands where it can grasp the object it has claimed.
+    fn ready(grasp: [f64; 2], more: &str) -> Bench {
+        let home = [FAR[0][0] + grasp[0], FAR[0][1] + grasp[1]];
+        let mut bench = Bench::new(room(&[home, [8.0, 1.0]], &[FAR], grasp, more));
+        bench.claim(0, 0);
+        bench.step();
+        bench
+    }
+
+    #[test]
+    fn a_grip_of_no_duration_takes_place_at_once() {
+        let mut bench = ready(BELOW, "");
+        bench.grip(0, Grip::Grasp);
+        bench.step();
+        assert_eq!((bench.robot(0).holding, bench.object(0).holder), (0, 0));
+        assert_eq!(bench.object(0).status, TaskStatus::Held.code());
+        assert_eq!(bench.robot(0).activity, Activity::Gripping.code());
+        let started = bench.events(EventKind::GraspStarted)[0];
+        assert_eq!(bench.events(EventKind::Grasped)[0].time_ns, started.time_ns);
+        assert_eq!(bench.header().placements, 1);
+    }
+
+    #[test]
+    fn a_grip_takes_its_duration_rounded_up_to_ticks() {
+        let mut bench = ready(BELOW, "grasp_s = 0.025\nrelease_s = 0.01");
+        bench.grip(0, Grip::Grasp);
+        bench.step();
+        let started_ns = bench.events(EventKind::GraspStarted)[0].time_ns;
+        for _ in 0..2 {
+            assert_eq!(bench.robot(0).holding, NONE);
+            assert_eq!(bench.robot(0).activity, Activity::Gripping.code());
+            bench.step();
+        }
+        assert_eq!(bench.robot(0).holding, 0);
+        let grasped_ns = bench.events(EventKind::Grasped)[0].time_ns;
+        assert_eq!(grasped_ns - started_ns, 30_000_000);
+        bench.grip(0, Grip::Keep);
+        bench.drive(0, &[[2.0, 1.0]]);
+        bench.release(0);
+        let ended = bench.events(EventKind::Released)[0].time_ns;
+        assert_eq!(
+            ended - bench.events(EventKind::ReleaseStarted)[0].time_ns,
+            10_000_000
+        );
+        assert_eq!(bench.robot(0).activity, Activity::Gripping.code());
+    }
+
+    #[test]
+    fn nothing_is_grasped_from_afar_or_without_a_claim() {
+        let mut bench = ready(BELOW, "");
+        bench.drive(0, &[[1.0, 0.999]]);
+        bench.grip(0, Grip::Grasp);
+        bench.step();
+        assert_eq!(bench.robot(0).holding, NONE);
+        bench.grip(0, Grip::Keep);
+        bench.drive(0, &[[1.0, 1.0]]);
+        bench.commands[0].claim = shm_types::Claim::NONE;
+        bench.grip(0, Grip::Grasp);
+        bench.step();
+        assert_eq!(bench.robot(0).holding, NONE);
+        assert_eq!(bench.world.counters().grips_refused, 2);
+    }
+
+    #[test]
+    fn a_claim_of_an_older_epoch_grasps_nothing() {
+        let mut bench = ready(BELOW, "");
+        bench.tell(ControlKind::Down, 1, 1);
+        bench.step();
+        assert_eq!(bench.header().epoch, 2);
+        bench.grip(0, Grip::Grasp);
+        bench.step();
+        assert_eq!(
+            bench.robot(0).holding,
+            NONE,
+            "others may have selected its task by now"
+        );
+        bench.claim(0, 0);
+        bench.step();
+        assert_eq!(bench.robot(0).holding, 0);
+    }
+
+    #[test]
+    fn a_grip_gives_up_what_is_granted_ahead() {
+        let mut bench = ready(BELOW, "grasp_s = 0.02");
+        bench.ask(0, &[[1.0, 0.5]]);
+        bench.commands[0].go = 0;
+        bench.step();
+        assert_eq!(bench.robot(0).grant_count, 1);
+        bench.commands[0].go = 1;
+        bench.grip(0, Grip::Grasp);
+        bench.steps(4);
+        assert_eq!(bench.robot(0).holding, 0);
+        assert_eq!((bench.robot(0).grant_count, bench.at(0)), (0, [1.0, 1.0]));
+    }
+
+    /// An object that robots lift from below and may pass under, and two robots.
+    fn canopy() -> Scene {
+        let text = "name = \"canopy\"\n[robot]\nshape = { box = [0.5, 0.5] }\nspeed = 0.5\n\
+            [object]\nshape = { box = [0.8, 0.8] }\ngrasp = [0.0, 0.0]\npass_under = true\n\
+            [workspace]\nbounds = [0.0, 0.0, 10.0, 6.0]\n\
+            [[robots]]\nhome = [1.0, 1.0]\n[[robots]]\nhome = [5.0, 1.0]\n\
+            [[objects]]\nstart = [3.0, 1.0]\ngoal = [3.0, 4.0]\n";
+        scene::parse(text, "canopy.toml").unwrap()
+    }
+
+    #[test]
+    fn nothing_is_lifted_over_somebody_else() {
+        let mut bench = Bench::new(canopy());
+        bench.claim(0, 0);
+        bench.drive(0, &[[3.0, 1.0]]);
+        bench.drive(1, &[[3.5, 1.0]]);
+        bench.grip(0, Grip::Grasp);
+        bench.step();
+        assert_eq!(bench.robot(0).holding, NONE, "robot 1 is under it too");
+        bench.grip(0, Grip::Keep);
+        bench.drive(1, &[[5.0, 1.0]]);
+        bench.grasp(0);
+        bench.ask(1, &[[3.5, 1.0]]);
+        bench.steps(400);
+        assert!(bench.at(1)[0] >= 3.65 - 1e-9, "held, it is in the way");
+    }
+
+    #[test]
+    fn the_robot_under_what_it_has_put_down_may_leave() {
+        for pass_under in [true, false] {
+            let mut scene = canopy();
+            scene.objects[0].pass_under = pass_under;
+            let mut bench = Bench::new(scene);
+            bench.claim(0, 0);
+            bench.drive(0, &[[3.0, 1.0]]);
+            bench.grasp(0);
+            bench.drive(0, &[[3.0, 4.0]]);
+            bench.release(0);
+            assert_eq!(bench.object(0).status, TaskStatus::Done.code());
+            bench.drive(0, &[[1.0, 4.0]]);
+            bench.ask(0, &[[3.0, 4.0]]);
+            bench.steps(600);
+            let under = bench.at(0)[0] > 2.4;
+            assert_eq!(under, pass_under, "once it has left it may not come back");
+        }
+    }
+
+    #[test]
+    fn a_touched_target_is_approached_and_left_despite_the_clearance() {
+        let objects = [[[3.0, 2.0], [5.0, 4.0]]];
+        let mut bench = Bench::new(room(&[[3.0, 1.0]], &objects, BELOW, "clearance = 0.1"));
+        bench.ask(0, &[[3.0, 1.55]]);
+        bench.steps(200);
+        assert!(bench.at(0)[1] < 1.451, "not claimed: clearance is kept");
+        bench.claim(0, 0);
+        bench.steps(40);
+        assert_eq!(bench.at(0), [3.0, 1.55]);
+        bench.grasp(0);
+        bench.drive(0, &[[5.0, 3.55]]);
+        bench.release(0);
+        assert_eq!(bench.object(0).status, TaskStatus::Done.code());
+        bench.drive(0, &[[5.0, 1.0]]);
+        bench.ask(0, &[[5.0, 3.55]]);
+        bench.steps(600);
+        assert!(bench.at(0)[1] < 3.451, "left, it is like any other");
+    }
+
+    #[test]
+    fn putting_down_at_the_goal_puts_it_exactly_there() {
+        let mut bench = ready([0.1, -0.45], "");
+        bench.grasp(0);
+        // The sum is not exact in floating point.
+        bench.drive(0, &[[5.0 + 0.1, 5.0 - 0.45]]);
+        bench.release(0);
+        let object = bench.object(0);
+        assert_eq!((object.position, object.rest), (object.goal, object.goal));
+        assert_eq!(object.status, TaskStatus::Done.code());
+    }
+}

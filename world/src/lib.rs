@@ -32,6 +32,8 @@ mod invariants;
 mod journal;
 mod motion;
 mod path;
+#[cfg(test)]
+mod random;
 mod requests;
 mod settled;
 mod state;

@@ -79,3 +79,101 @@ fn record(i: usize, robot: &Robot, scene: &Scene, span: Span, journal: &mut Jour
         start_ns = end_ns;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use shm_types::{BodyKind, Grip, MotionRecord};
+
+    use crate::testing::{BELOW, Bench, room};
+
+    fn of(bench: &Bench, body: BodyKind) -> Vec<MotionRecord> {
+        let motions = bench.batch.motions().iter();
+        motions.filter(|m| m.body == body.code()).copied().collect()
+    }
+
+    #[test]
+    fn pieces_join_in_space_and_time_and_add_up_to_the_speed() {
+        let mut bench = Bench::new(room(&[[1.0, 1.0]], &[], BELOW, ""));
+        let corners = [[1.003, 1.0], [1.003, 1.001], [1.006, 1.001], [3.0, 1.001]];
+        bench.ask(0, &corners);
+        let (mut at, mut end_ns) = (bench.robot(0).position, 0);
+        for _ in 0..10 {
+            bench.step();
+            let pieces = of(&bench, BodyKind::Robot);
+            assert_eq!(bench.batch.time_ns, bench.header().time_ns);
+            for piece in pieces {
+                assert_eq!((piece.from, piece.start_ns), (at, end_ns));
+                let length_m =
+                    (piece.to.x - piece.from.x).abs() + (piece.to.y - piece.from.y).abs();
+                let exact_ns = length_m / 0.5 * 1e9;
+                let taken_ns = (piece.end_ns - piece.start_ns) as f64;
+                assert!(
+                    (taken_ns - exact_ns).abs() <= 1.0,
+                    "{taken_ns} for {exact_ns}"
+                );
+                (at, end_ns) = (piece.to, piece.end_ns);
+            }
+        }
+        assert_eq!(bench.robot(0).position, at);
+        assert_eq!(end_ns, bench.header().time_ns);
+        assert!((at.x - 1.049).abs() < 1e-12, "{at:?}");
+    }
+
+    #[test]
+    fn a_held_object_moves_with_its_robot() {
+        let objects = [[[1.0, 1.45], [5.0, 5.0]]];
+        let mut bench = Bench::new(room(&[[1.0, 1.0]], &objects, BELOW, ""));
+        bench.claim(0, 0);
+        bench.step();
+        bench.grasp(0);
+        bench.ask(0, &[[1.1, 1.0], [1.3, 1.2]]);
+        for _ in 0..80 {
+            bench.step();
+            let (robot, object) = (bench.robot(0).position, bench.object(0).position);
+            assert_eq!(object.x, robot.x);
+            assert_eq!(object.y, robot.y + 0.45);
+            let (robots, objects) = (of(&bench, BodyKind::Robot), of(&bench, BodyKind::Object));
+            assert_eq!(robots.len(), objects.len());
+            for (r, o) in robots.iter().zip(&objects) {
+                assert_eq!((r.start_ns, r.end_ns), (o.start_ns, o.end_ns));
+                assert_eq!((o.to.x, o.to.y), (r.to.x, r.to.y + 0.45));
+            }
+        }
+        assert_eq!(bench.at(0), [1.3, 1.2]);
+        bench.grip(0, Grip::Release);
+        bench.step();
+        assert_eq!(bench.object(0).rest, bench.object(0).position);
+    }
+
+    #[test]
+    fn a_stale_command_holds_its_robot() {
+        let mut bench = Bench::new(room(&[[1.0, 1.0]], &[], BELOW, ""));
+        bench.ask(0, &[[8.0, 1.0]]);
+        bench.step();
+        let last = bench.commands[0].valid_until_tick;
+        while bench.header().tick <= last {
+            bench.step_as_is();
+        }
+        let at = bench.at(0);
+        assert!(at[0] > 1.0);
+        for _ in 0..5 {
+            bench.step_as_is();
+        }
+        assert_eq!(bench.at(0), at);
+        assert!(bench.robot(0).grant_count > 0, "its grant stays");
+        assert_eq!(bench.world.counters().stale_commands, 5);
+        bench.step();
+        assert!(bench.at(0)[0] > at[0], "a fresh one frees it");
+    }
+
+    #[test]
+    fn a_robot_that_computes_stands_still_and_keeps_its_grant() {
+        let mut bench = Bench::new(room(&[[1.0, 1.0]], &[], BELOW, ""));
+        bench.ask(0, &[[8.0, 1.0]]);
+        bench.step();
+        bench.commands[0].go = 0;
+        bench.steps(5);
+        assert_eq!(bench.at(0), [1.005, 1.0]);
+        assert_eq!(bench.robot(0).grant().last().unwrap().x, 8.0);
+    }
+}

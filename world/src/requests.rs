@@ -73,3 +73,92 @@ fn crosses_no_wall(scene: &Scene, bodies: &Bodies, robot: &Robot, path: &Path) -
         !bodies.meets_wall(scene, sweep, true)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::testing::{BELOW, Bench, room};
+
+    fn bench() -> Bench {
+        let objects = [[[3.0, 1.0], [5.0, 5.0]]];
+        Bench::new(room(&[[1.0, 1.0], [1.0, 3.0]], &objects, BELOW, ""))
+    }
+
+    fn refused(bench: &mut Bench, corners: &[[f64; 2]]) -> bool {
+        let before = bench.world.counters().invalid_requests;
+        bench.ask(0, corners);
+        bench.step();
+        let request = bench.commands[0].path.id;
+        assert_eq!(bench.robot(0).request, request, "taken, good or bad");
+        bench.world.counters().invalid_requests > before
+    }
+
+    #[test]
+    fn a_path_through_a_wall_or_out_of_the_room_is_refused() {
+        for bad in [[0.2, 1.0], [-5.0, 1.0], [1e300, 1.0], [1.0, 7.0]] {
+            let mut bench = bench();
+            assert!(refused(&mut bench, &[[1.5, 1.0], bad]), "{bad:?}");
+            assert_eq!(bench.robot(0).request_open, 0);
+            assert_eq!(bench.robot(0).grant_count, 0);
+        }
+        assert!(
+            !refused(&mut bench(), &[[1.5, 1.0], [1.5, 0.25]]),
+            "touching"
+        );
+    }
+
+    #[test]
+    fn a_path_that_starts_elsewhere_is_refused() {
+        let mut bench = bench();
+        bench.ask(0, &[[2.0, 1.0]]);
+        bench.commands[0].path.points[0].x += 1e-3;
+        bench.steps(3);
+        assert_eq!(bench.world.counters().invalid_requests, 1, "counted once");
+        assert_eq!(bench.at(0), [1.0, 1.0]);
+        assert!(!refused(&mut bench, &[[2.0, 1.0]]), "the next one is good");
+    }
+
+    #[test]
+    fn a_newer_request_replaces_what_is_not_granted() {
+        let mut bench = bench();
+        bench.ask(0, &[[8.0, 1.0]]);
+        bench.steps(600);
+        assert_eq!(bench.robot(0).request_open, 1, "the object is in the way");
+        let x = bench.at(0)[0];
+        bench.ask(0, &[[x, 2.0], [8.0, 2.0]]);
+        bench.steps(2_000);
+        assert_eq!(bench.at(0), [8.0, 2.0]);
+    }
+
+    #[test]
+    fn an_empty_request_drops_what_is_not_granted() {
+        let mut bench = bench();
+        bench.ask(0, &[[8.0, 1.0]]);
+        bench.step();
+        bench.ask(0, &[]);
+        bench.commands[0].path.count = 0;
+        bench.steps(600);
+        assert_eq!(bench.robot(0).request_open, 0);
+        assert!(bench.at(0)[0] > 2.0, "what was granted stays");
+        assert_eq!(bench.world.counters().invalid_requests, 0);
+    }
+
+    #[test]
+    fn points_on_top_of_each_other_are_one() {
+        let mut bench = bench();
+        let corners = [[1.0, 1.0], [2.0, 1.0], [2.0, 1.0], [2.0 + 1e-12, 1.0]];
+        bench.drive(0, &corners);
+        assert_eq!(bench.at(0), [2.0 + 1e-12, 1.0]);
+    }
+
+    #[test]
+    fn an_older_request_is_not_taken_again() {
+        let mut bench = bench();
+        bench.ask(0, &[[1.5, 1.0]]);
+        bench.step();
+        bench.ask(0, &[[2.0, 1.0]]);
+        bench.commands[0].path.id = 1;
+        bench.steps(300);
+        assert_eq!(bench.at(0), [1.5, 1.0]);
+        assert_eq!(bench.world.counters().invalid_requests, 0);
+    }
+}

@@ -91,7 +91,7 @@ impl World {
             Outcome::Interrupted
         } else if self.settled_ticks >= SETTLED_TICKS {
             Outcome::Stuck
-        } else if self.time_ns >= self.settings.time_limit_ns {
+        } else if self.time_ns + self.settings.tick_ns >= self.settings.time_limit_ns {
             Outcome::Timeout
         } else {
             Outcome::Running
@@ -122,5 +122,144 @@ impl World {
                     && !r.hand.is_moving()
                     && r.failure.is_none()
             })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use scene::Settings;
+    use shm_types::{ControlKind, EventKind, FailureCause, NONE};
+
+    use super::*;
+    use crate::testing::{BELOW, Bench, room};
+
+    const OBJECTS: [[[f64; 2]; 2]; 1] = [[[1.0, 1.45], [2.0, 1.45]]];
+
+    fn bench() -> Bench {
+        Bench::new(room(&[[1.0, 1.0], [8.0, 1.0]], &OBJECTS, BELOW, ""))
+    }
+
+    fn settle_all(bench: &mut Bench, ticks: usize) {
+        for _ in 0..ticks {
+            bench.settle(0);
+            bench.settle(1);
+            bench.step();
+        }
+    }
+
+    #[test]
+    fn solved_is_every_object_at_its_goal_and_every_robot_at_home() {
+        let mut bench = bench();
+        bench.claim(0, 0);
+        bench.step();
+        bench.grasp(0);
+        bench.drive(0, &[[2.0, 1.0]]);
+        bench.release(0);
+        assert_eq!(bench.world.outcome(), Outcome::Running, "not at home yet");
+        bench.ask(0, &[[1.0, 1.0]]);
+        bench.steps(199);
+        assert_eq!(bench.world.outcome(), Outcome::Running);
+        bench.steps(3);
+        assert_eq!(bench.header().outcome, Outcome::Solved.code());
+    }
+
+    #[test]
+    fn stuck_is_when_all_have_looked_since_the_last_change() {
+        let mut bench = bench();
+        bench.steps(5);
+        settle_all(&mut bench, 1);
+        assert_eq!(
+            bench.world.outcome(),
+            Outcome::Running,
+            "one tick is not enough"
+        );
+        assert_eq!(bench.world.stuck_reason(&bench.scene), None);
+        settle_all(&mut bench, 1);
+        assert_eq!(bench.world.outcome(), Outcome::Stuck);
+        assert_eq!(bench.events(EventKind::Ended).len(), 1);
+        let reason = bench.world.stuck_reason(&bench.scene).unwrap();
+        assert_eq!(
+            reason,
+            StuckReason {
+                waiting: 1,
+                ..StuckReason::default()
+            }
+        );
+    }
+
+    #[test]
+    fn who_has_not_looked_keeps_the_run_going() {
+        let mut bench = bench();
+        for _ in 0..20 {
+            bench.settle(0);
+            bench.step();
+        }
+        assert_eq!(bench.world.outcome(), Outcome::Running);
+        // What was looked at before a change counts no more.
+        bench.settle(0);
+        bench.settle(1);
+        bench.claim(1, 0);
+        bench.steps(20);
+        assert_eq!(bench.world.outcome(), Outcome::Running);
+        settle_all(&mut bench, 2);
+        assert_eq!(bench.world.outcome(), Outcome::Stuck);
+    }
+
+    #[test]
+    fn a_busy_planner_an_open_failure_or_a_hold_keeps_the_run_going() {
+        let mut bench = bench();
+        bench.steps(2);
+        bench.planner.busy = 1;
+        settle_all(&mut bench, 20);
+        assert_eq!(bench.world.outcome(), Outcome::Running);
+        bench.planner.busy = 0;
+        bench.planner.constraints_version = 3;
+        settle_all(&mut bench, 20);
+        assert_eq!(
+            bench.world.outcome(),
+            Outcome::Running,
+            "a version is on its way"
+        );
+        bench.planner.constraints_version = 0;
+        bench.fail(0, 0, FailureCause::Objects, NONE);
+        bench.commands[0].failure.answered = 0;
+        settle_all(&mut bench, 20);
+        assert_eq!(bench.world.outcome(), Outcome::Running);
+        bench.commands[0].failure.id = 0;
+        bench.tell(ControlKind::Hold, 0, 0);
+        settle_all(&mut bench, 20);
+        assert_eq!(bench.world.outcome(), Outcome::Running);
+        bench.tell(ControlKind::Resume, 0, 0);
+        settle_all(&mut bench, 4);
+        assert_eq!(bench.world.outcome(), Outcome::Stuck);
+    }
+
+    #[test]
+    fn robots_that_are_gone_are_not_waited_for_but_named() {
+        let mut bench = bench();
+        bench.tell(ControlKind::Down, 1, 1);
+        bench.step();
+        bench.fail(0, 0, FailureCause::Objects, NONE);
+        bench.step();
+        for _ in 0..3 {
+            bench.settle(0);
+            bench.step();
+        }
+        let reason = bench.world.stuck_reason(&bench.scene).unwrap();
+        assert_eq!((reason.gone, reason.waiting, reason.barred), (1, 1, 1));
+        assert!(reason.to_string().contains("1 robots are gone"), "{reason}");
+    }
+
+    #[test]
+    fn the_time_limit_ends_a_run() {
+        let settings = Settings {
+            time_limit_ns: 1_000_000_000,
+            ..Settings::default()
+        };
+        let mut bench = Bench::with(room(&[[1.0, 1.0]], &OBJECTS, BELOW, ""), settings);
+        bench.steps(99);
+        assert_eq!(bench.world.outcome(), Outcome::Running);
+        bench.step();
+        assert_eq!(bench.header().outcome, Outcome::Timeout.code());
     }
 }

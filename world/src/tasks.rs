@@ -109,3 +109,134 @@ fn place_of(position: Vec2, goal: Option<Vec2>) -> Vec2 {
         _ => position,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use scene::Settings;
+    use shm_types::{EventKind, FailureCause, Grip, NONE, Phase, TaskStatus};
+
+    use crate::testing::{BELOW, Bench, room};
+
+    const OBJECTS: [[[f64; 2]; 2]; 2] = [[[1.0, 1.45], [2.0, 1.45]], [[5.0, 3.0], [5.0, 5.0]]];
+
+    fn bench(settings: Settings) -> Bench {
+        Bench::with(
+            room(&[[1.0, 1.0], [8.0, 1.0]], &OBJECTS, BELOW, ""),
+            settings,
+        )
+    }
+
+    fn carrying() -> Bench {
+        let mut bench = bench(Settings::default());
+        bench.claim(0, 0);
+        bench.step();
+        bench.grasp(0);
+        bench
+    }
+
+    #[test]
+    fn releasing_at_the_goal_completes_the_task_and_opens_an_epoch() {
+        let mut bench = carrying();
+        bench.drive(0, &[[2.0, 1.0]]);
+        assert_eq!((bench.header().epoch, bench.header().events), (1, 0));
+        bench.release(0);
+        assert_eq!(bench.events(EventKind::Completed).len(), 1);
+        assert_eq!((bench.header().epoch, bench.header().events), (2, 1));
+        let object = bench.object(0);
+        assert_eq!(
+            (object.status, object.claimed_by),
+            (TaskStatus::Done.code(), NONE)
+        );
+        assert_eq!(object.epoch_status, TaskStatus::Done.code());
+        assert_eq!((bench.robot(0).task, bench.robot(0).epoch_free), (NONE, 1));
+    }
+
+    #[test]
+    fn releasing_elsewhere_puts_the_task_back_into_the_pool() {
+        let mut bench = carrying();
+        bench.drive(0, &[[1.5, 1.0]]);
+        bench.release(0);
+        assert!(bench.events(EventKind::Completed).is_empty());
+        assert_eq!((bench.header().epoch, bench.header().events), (2, 0));
+        let object = bench.object(0);
+        assert_eq!(
+            (object.status, object.claimed_by),
+            (TaskStatus::Waiting.code(), NONE)
+        );
+        assert_eq!(object.rest, shm_types::Point::new(1.5, 1.45));
+        assert_eq!(object.epoch_status, TaskStatus::Waiting.code());
+        bench.claim(1, 0);
+        bench.step();
+        assert_eq!(bench.robot(1).task, 0);
+    }
+
+    #[test]
+    fn an_object_at_its_goal_needs_no_transport() {
+        let objects = [[[1.0, 3.0], [1.0, 3.0]], [[3.0, 3.0], [3.0 + 2e-6, 3.0]]];
+        let bench = Bench::new(room(&[[1.0, 1.0]], &objects, BELOW, ""));
+        assert_eq!(bench.object(0).status, TaskStatus::Done.code());
+        assert_eq!(bench.object(1).status, TaskStatus::Waiting.code());
+    }
+
+    #[test]
+    fn an_answered_failure_is_counted_once_and_opens_an_epoch() {
+        let mut bench = bench(Settings::default());
+        bench.claim(0, 1);
+        bench.step();
+        bench.fail(0, 1, FailureCause::Objects, NONE);
+        bench.step();
+        let failed = bench.events(EventKind::Failed);
+        assert_eq!(
+            (failed[0].robot, failed[0].task, failed[0].other),
+            (0, 1, NONE)
+        );
+        assert_eq!(failed[0].value, u64::from(FailureCause::Objects.code()));
+        bench.steps(5);
+        assert_eq!(bench.world.counters().task_failures, 1);
+        assert_eq!((bench.header().epoch, bench.header().events), (2, 1));
+        assert_eq!(bench.object(1).failures, 1);
+    }
+
+    #[test]
+    fn two_failures_in_one_tick_open_one_epoch() {
+        let mut bench = bench(Settings::default());
+        bench.fail(0, 0, FailureCause::Objects, NONE);
+        bench.fail(1, 1, FailureCause::Objects, NONE);
+        bench.step();
+        assert_eq!((bench.header().epoch, bench.header().events), (2, 2));
+    }
+
+    #[test]
+    fn a_failure_waits_for_its_answer_or_its_deadline() {
+        let settings = Settings {
+            answer_deadline_ns: 100_000_000,
+            ..Settings::default()
+        };
+        let mut bench = bench(settings);
+        bench.fail(0, 1, FailureCause::Objects, NONE);
+        bench.commands[0].failure.answered = 0;
+        bench.commands[0].phase = Phase::Failing.code();
+        bench.steps(10);
+        assert_eq!((bench.header().epoch, bench.object(1).failures), (1, 0));
+        bench.step();
+        assert_eq!((bench.header().epoch, bench.object(1).failures), (2, 1));
+        assert_eq!(bench.world.counters().answers_missed, 1);
+        bench.fail(0, 0, FailureCause::Objects, NONE);
+        bench.commands[0].failure.answered = 0;
+        bench.step();
+        bench.commands[0].failure.answered = 1;
+        bench.step();
+        assert_eq!((bench.header().epoch, bench.object(0).failures), (3, 1));
+        assert_eq!(bench.world.counters().answers_missed, 1);
+    }
+
+    #[test]
+    fn a_carrying_robot_does_not_fail() {
+        let mut bench = carrying();
+        bench.fail(0, 0, FailureCause::Objects, NONE);
+        bench.steps(3);
+        assert_eq!(bench.world.counters().task_failures, 0);
+        assert_eq!((bench.header().epoch, bench.robot(0).task), (1, 0));
+        bench.grip(0, Grip::Keep);
+    }
+}

@@ -168,3 +168,211 @@ fn hash_robot(robot: &Robot, hash: &mut StateHash) {
         hash.add(&pending.since_ns);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use scene::Vec2;
+    use shm_types::{Activity, Claim, Failure, FailureCause, Grip, NONE, Point};
+
+    use crate::state::{Claimed, Hand, PendingFailure};
+    use crate::step::World;
+    use crate::testing::{BELOW, Bench, room};
+
+    const OBJECTS: [[[f64; 2]; 2]; 2] = [[[1.0, 1.45], [1.0, 5.0]], [[5.0, 3.0], [5.0, 5.0]]];
+
+    fn bench() -> Bench {
+        let mut bench = Bench::new(room(&[[1.0, 1.0], [3.0, 1.0]], &OBJECTS, BELOW, ""));
+        bench.claim(0, 0);
+        bench.ask(1, &[[8.0, 1.0], [8.0, 3.0]]);
+        bench.steps(3);
+        bench
+    }
+
+    /// The hash after one more tick with `change` made to the bench.
+    fn hash(change: impl FnOnce(&mut Bench)) -> u64 {
+        let mut bench = bench();
+        change(&mut bench);
+        bench.step_unsound();
+        bench.header().state_hash
+    }
+
+    #[test]
+    fn the_same_run_has_the_same_hash_at_every_tick() {
+        let (mut one, mut other) = (bench(), bench());
+        for _ in 0..20 {
+            one.step();
+            other.step();
+            assert_eq!(one.header().state_hash, other.header().state_hash);
+        }
+        assert_ne!(one.header().state_hash, hash(|_| {}));
+    }
+
+    #[test]
+    fn the_past_is_part_of_the_hash() {
+        let (mut one, mut other) = (bench(), bench());
+        one.commands[0].state_hash = 1;
+        one.step();
+        other.step();
+        one.commands[0].state_hash = 0;
+        one.step();
+        other.step();
+        assert_eq!(one.robot(0).position, other.robot(0).position);
+        assert_ne!(one.header().state_hash, other.header().state_hash);
+    }
+
+    #[test]
+    fn flipping_any_field_of_a_command_changes_the_hash() {
+        let plain = hash(|_| {});
+        let changes: [fn(&mut shm_types::Command); 29] = [
+            |c| c.tick -= 1,
+            |c| c.valid_until_tick += 1,
+            |c| c.counters.easy_constraints = 1,
+            |c| c.robot = 1,
+            |c| c.incarnation = 3,
+            |c| c.sequence += 7,
+            |c| c.settled_at_change = 0,
+            |c| c.state_hash = 5,
+            |c| c.phase = 3,
+            |c| c.activity = 2,
+            |c| c.go = 1,
+            |c| c.grip = Grip::Release.code(),
+            |c| c.claim.task = 1,
+            |c| c.claim.epoch = 0,
+            |c| c.claim.constraints_version = 2,
+            |c| c.failure.id = 1,
+            |c| c.failure.task = 1,
+            |c| c.failure.cause = FailureCause::Objects.code(),
+            |c| c.failure.blocker = 1,
+            |c| c.failure.answered = 1,
+            |c| c.failure.epoch = 1,
+            |c| c.path.id = 9,
+            |c| {
+                c.path.count = 1;
+            },
+            |c| {
+                c.path.count = 1;
+                c.path.points[0] = Point::new(0.0, 1e-300);
+            },
+            |c| c.counters.polygon_tests = 1,
+            |c| c.counters.path_plans = 1,
+            |c| c.counters.cells_expanded = 1,
+            |c| c.counters.selections = 1,
+            |c| c.counters.units = 1,
+        ];
+        let mut hashes: Vec<u64> = changes
+            .iter()
+            .map(|change| hash(|bench| change(&mut bench.commands[0])))
+            .collect();
+        hashes.push(plain);
+        hashes.push(hash(|bench| bench.planner.state_hash = 1));
+        hashes.push(hash(|bench| bench.planner.counters.units = 1));
+        let count = hashes.len();
+        hashes.sort_unstable();
+        hashes.dedup();
+        assert_eq!(hashes.len(), count, "each change has a hash of its own");
+    }
+
+    #[test]
+    fn what_is_past_the_path_s_count_is_no_state() {
+        let plain = hash(|_| {});
+        let changed = hash(|bench| bench.commands[0].path.points[7] = Point::new(1.0, 1.0));
+        assert_eq!(plain, changed);
+    }
+
+    #[test]
+    fn flipping_any_private_field_changes_the_hash() {
+        let failure = PendingFailure {
+            report: Failure::default(),
+            since_ns: 4,
+        };
+        let changes: Vec<Box<dyn Fn(&mut World)>> = vec![
+            Box::new(|w| w.robots[1].rest.push(Vec2::new(8.0, 4.0))),
+            Box::new(|w| w.robots[1].request_tick += 1),
+            Box::new(|w| w.robots[1].cut = true),
+            Box::new(|w| w.robots[1].refused = true),
+            Box::new(|w| w.robots[0].refused_claim = Some(Claimed { task: 1, epoch: 1 })),
+            Box::new(|w| w.robots[0].claim = Some(Claimed { task: 0, epoch: 0 })),
+            Box::new(|w| w.robots[0].leaving.add(0)),
+            Box::new(|w| w.robots[0].last_failure = 4),
+            Box::new(move |w| w.robots[0].failure = Some(failure)),
+            Box::new(|w| {
+                w.robots[0].hand = Hand::Closing {
+                    object: 0,
+                    ticks: 4,
+                }
+            }),
+            Box::new(|w| {
+                w.robots[0].hand = Hand::Closing {
+                    object: 0,
+                    ticks: 5,
+                }
+            }),
+            Box::new(|w| {
+                w.robots[0].hand = Hand::Opening {
+                    object: 0,
+                    ticks: 5,
+                }
+            }),
+            Box::new(|w| w.bar(0, 1, robots_failure(1))),
+            Box::new(|w| w.bar(1, 1, robots_failure(1))),
+            Box::new(|w| w.stopped = true),
+            Box::new(|w| w.settled_ticks = 1),
+            Box::new(|w| w.constraints.in_force.effect_tick = 1),
+        ];
+        let mut hashes: Vec<u64> = changes
+            .iter()
+            .map(|change| {
+                let mut bench = bench();
+                change(&mut bench.world);
+                bench.world.chain(None);
+                bench.world.state_hash()
+            })
+            .collect();
+        let mut plain = bench();
+        plain.world.chain(None);
+        hashes.push(plain.world.state_hash());
+        let count = hashes.len();
+        hashes.sort_unstable();
+        hashes.dedup();
+        assert_eq!(hashes.len(), count, "each change has a hash of its own");
+    }
+
+    fn robots_failure(blocker: u32) -> Failure {
+        Failure {
+            cause: FailureCause::Robots.code(),
+            blocker,
+            ..Failure::default()
+        }
+    }
+
+    #[test]
+    fn a_loan_that_held_something_else_is_written_over() {
+        let bench = bench();
+        let mut dirty: Box<shm_types::WorldSnapshot> = shm_types::zeroed();
+        for robot in &mut dirty.robots {
+            robot.grant.fill(Point::new(9.0, 9.0));
+            robot.task = 5;
+        }
+        bench.world.snapshot_into(&mut dirty);
+        let mut hashes = [shm_types::StateHash::new(), shm_types::StateHash::new()];
+        bench.snapshot.hash_into(&mut hashes[0]);
+        dirty.hash_into(&mut hashes[1]);
+        assert_eq!(hashes[0].finish(), hashes[1].finish());
+        assert_eq!(dirty.robots[0].grant[20], Point::default());
+    }
+
+    #[test]
+    fn the_first_snapshot_is_the_initial_state() {
+        let bench = Bench::new(room(&[[1.0, 1.0]], &OBJECTS, BELOW, ""));
+        let header = bench.header();
+        assert_eq!((header.tick, header.epoch, header.change), (0, 1, 0));
+        assert_eq!((header.run_id, header.scenario_hash), (7, bench.scene.hash));
+        assert_ne!(header.state_hash, 0);
+        let robot = bench.robot(0);
+        assert_eq!((robot.task, robot.holding, robot.live), (NONE, NONE, 1));
+        assert_eq!((robot.epoch_free, robot.incarnation), (1, 1));
+        assert_eq!(robot.activity, Activity::Idle.code());
+        assert_eq!(bench.commands[0].claim, Claim::NONE);
+        shm_types::Checked::new(&*bench.snapshot, bench.scene.counts()).unwrap();
+    }
+}

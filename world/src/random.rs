@@ -1,0 +1,295 @@
+//! Whatever is commanded, sense or nonsense: no overlap, nothing lost or doubled, no motion off
+//! grants, grants disjoint, every tick accounted for.
+
+use proptest::prelude::*;
+use scene::{Scene, Vec2};
+use shm_types::{
+    Activity, BodyKind, Checked, Claim, ControlKind, Failure, FailureCause, Grip, NONE, Outcome,
+    Point, index,
+};
+
+use crate::testing::{Bench, TICK_M};
+
+/// One thing that changes between two ticks.
+#[derive(Clone, Debug)]
+enum Act {
+    /// Robot claims a task, selected so many epochs ago.
+    Claim(usize, u32, u64),
+    GiveBack(usize),
+    /// Robot claims a task and asks for a path to where it can grasp its object, sideways first
+    /// or upwards first, and for the grasp.
+    AskToGrasp(usize, usize, bool),
+    /// Robot asks for a path to where it can release an object at its goal.
+    AskToRelease(usize, usize, bool),
+    AskFor(usize, Vec<[f64; 2]>),
+    Garbage(usize, [f64; 2], u32),
+    Go(usize, bool),
+    Grip(usize, Grip),
+    Fail(usize, u32, FailureCause, u32, bool),
+    Silent(usize, bool),
+    Control(ControlKind, usize),
+    /// So many ticks pass with everything as it is.
+    Wait(usize),
+}
+
+const ROBOTS: usize = 4;
+const OBJECTS: usize = 5;
+
+fn scene(clearance: bool, slow_grip: bool) -> Scene {
+    let clearance = if clearance { 0.025 } else { 0.0 };
+    let grip = if slow_grip { 0.035 } else { 0.0 };
+    let text = format!(
+        "name = \"random\"\n[robot]\nshape = {{ box = [0.5, 0.5] }}\nspeed = 0.5\n\
+         clearance = {clearance}\ngrasp_s = {grip}\nrelease_s = {grip}\n\
+         [object]\nshape = {{ box = [0.4, 0.4] }}\ngrasp = [0.0, -0.45]\n\
+         [workspace]\nbounds = [0.0, 0.0, 4.0, 3.5]\n\
+         walls = [{{ box = [1.8, 0.0, 2.0, 0.4] }}]\n\
+         [[robots]]\nhome = [0.5, 0.5]\n[[robots]]\nhome = [1.25, 0.5]\n\
+         [[robots]]\nhome = [2.5, 0.5]\n[[robots]]\nhome = [3.5, 0.5]\n\
+         [[objects]]\nstart = [1.0, 1.75]\ngoal = [1.0, 3.0]\n\
+         [[objects]]\nstart = [2.0, 1.75]\ngoal = [3.5, 2.5]\n\
+         [[objects]]\nstart = [3.0, 1.5]\ngoal = [1.75, 3.0]\n\
+         shape = {{ box = [0.7, 0.7] }}\ngrasp = [0.0, 0.0]\npass_under = true\n\
+         [[objects]]\nstart = [2.5, 2.75]\ngoal = [2.5, 3.0]\ngrasp = [0.0, 0.0]\n\
+         [[objects]]\nstart = [0.5, 2.5]\ngoal = [3.0, 1.5]\nshape = {{ circle = 0.2 }}\n"
+    );
+    scene::parse(&text, "random.toml").unwrap()
+}
+
+fn act() -> impl Strategy<Value = Act> {
+    let robot = 0..ROBOTS;
+    let task = 0..OBJECTS as u32;
+    let place =
+        (0_u32..=16, 0_u32..=14).prop_map(|(x, y)| [f64::from(x) * 0.25, f64::from(y) * 0.25]);
+    let anywhere = (-0.5..4.5, -0.5..4.0).prop_map(|(x, y)| [x, y]);
+    let number = prop_oneof![
+        Just(1e300),
+        Just(-1e300),
+        Just(1e-300),
+        Just(0.0),
+        Just(-0.0),
+        -1e9..1e9,
+        0.0..4.0
+    ];
+    let grip = prop_oneof![Just(Grip::Keep), Just(Grip::Grasp), Just(Grip::Release)];
+    let cause = prop_oneof![
+        Just(FailureCause::None),
+        Just(FailureCause::Objects),
+        Just(FailureCause::Robots)
+    ];
+    let kind = prop_oneof![
+        Just(ControlKind::Up),
+        Just(ControlKind::Down),
+        Just(ControlKind::Hold),
+        Just(ControlKind::Resume),
+        Just(ControlKind::Resume)
+    ];
+    prop_oneof![
+        4 => (robot.clone(), task.clone(), prop_oneof![4 => Just(0_u64), 1 => 1..3_u64])
+            .prop_map(|(r, t, late)| Act::Claim(r, t, late)),
+        1 => robot.clone().prop_map(Act::GiveBack),
+        6 => (robot.clone(), 0..OBJECTS, any::<bool>())
+            .prop_map(|(r, o, first)| Act::AskToGrasp(r, o, first)),
+        4 => (robot.clone(), 0..OBJECTS, any::<bool>())
+            .prop_map(|(r, o, first)| Act::AskToRelease(r, o, first)),
+        6 => (robot.clone(), proptest::collection::vec(place, 1..6))
+            .prop_map(|(r, path)| Act::AskFor(r, path)),
+        3 => (robot.clone(), proptest::collection::vec(anywhere, 1..31))
+            .prop_map(|(r, path)| Act::AskFor(r, path)),
+        2 => (robot.clone(), [number.clone(), number], 0_u32..=32)
+            .prop_map(|(r, point, count)| Act::Garbage(r, point, count)),
+        2 => (robot.clone(), prop_oneof![3 => Just(true), 1 => Just(false)])
+            .prop_map(|(r, go)| Act::Go(r, go)),
+        6 => (robot.clone(), grip).prop_map(|(r, grip)| Act::Grip(r, grip)),
+        2 => (robot.clone(), task, cause, prop_oneof![Just(NONE), 0..ROBOTS as u32], any::<bool>())
+            .prop_map(|(r, t, cause, by, answered)| Act::Fail(r, t, cause, by, answered)),
+        1 => (robot.clone(), any::<bool>()).prop_map(|(r, silent)| Act::Silent(r, silent)),
+        1 => (kind, robot).prop_map(|(kind, r)| Act::Control(kind, r)),
+        12 => (1_usize..120).prop_map(Act::Wait),
+    ]
+}
+
+/// A path with one corner from where the robot's grant ends.
+fn ask_to(bench: &mut Bench, i: usize, to: Vec2, sideways_first: bool) {
+    let robot = bench.robot(i);
+    let from = robot.grant().last().copied().unwrap_or(robot.position);
+    let corner = if sideways_first {
+        [to.x, from.y]
+    } else {
+        [from.x, to.y]
+    };
+    bench.ask(i, &[corner, [to.x, to.y]]);
+}
+
+fn perform(bench: &mut Bench, act: &Act) {
+    match act {
+        Act::Claim(i, task, late) => {
+            bench.claim(*i, *task);
+            let epoch = &mut bench.commands[*i].claim.epoch;
+            *epoch = epoch.saturating_sub(*late);
+        }
+        Act::GiveBack(i) => bench.commands[*i].claim = Claim::NONE,
+        Act::AskToGrasp(i, object, first) => {
+            let at = scene::vec(bench.object(*object).position);
+            let to = bench.scene.grasp_at(*object, at);
+            bench.claim(*i, *object as u32);
+            bench.grip(*i, Grip::Grasp);
+            ask_to(bench, *i, to, *first);
+        }
+        Act::AskToRelease(i, object, first) => {
+            let object = index(bench.robot(*i).holding).unwrap_or(*object);
+            let goal = bench.scene.objects[object].goal.unwrap();
+            let to = bench.scene.grasp_at(object, goal);
+            ask_to(bench, *i, to, *first);
+        }
+        Act::AskFor(i, corners) => bench.ask(*i, corners),
+        Act::Garbage(i, point, count) => {
+            let path = &mut bench.commands[*i].path;
+            path.id = path.id.wrapping_add(1);
+            path.count = *count;
+            path.points[1..].fill(Point::new(point[0], point[1]));
+        }
+        Act::Go(i, go) => bench.commands[*i].go = u32::from(*go),
+        Act::Grip(i, grip) => bench.grip(*i, *grip),
+        Act::Fail(i, task, cause, blocker, answered) => {
+            let id = bench.commands[*i].failure.id + 1;
+            bench.commands[*i].failure = Failure {
+                id,
+                task: *task,
+                cause: cause.code(),
+                blocker: *blocker,
+                answered: u32::from(*answered),
+                reserved: 0,
+                epoch: bench.header().epoch,
+            };
+        }
+        Act::Silent(i, silent) => bench.silent[*i] = *silent,
+        Act::Control(kind, i) => {
+            let incarnation = bench.robot(*i).incarnation + u32::from(*kind == ControlKind::Up);
+            if *kind == ControlKind::Up {
+                bench.commands[*i].incarnation = incarnation;
+            }
+            bench.tell(*kind, *i as u32, incarnation);
+        }
+        Act::Wait(_) => {}
+    }
+}
+
+/// Where everything is, robots first.
+fn places(bench: &Bench) -> Vec<Point> {
+    let robots = (0..ROBOTS).map(|i| bench.robot(i).position);
+    robots
+        .chain((0..OBJECTS).map(|o| bench.object(o).position))
+        .collect()
+}
+
+fn check(bench: &Bench, before: &[Point]) -> Result<(), TestCaseError> {
+    let counts = bench.scene.counts();
+    Checked::new(&*bench.snapshot, counts).unwrap();
+    Checked::new(&*bench.batch, counts).unwrap();
+    prop_assert_eq!(bench.overlapping(), None);
+    prop_assert_eq!(bench.overlapping_grants(), None);
+    let mut expected = before.to_vec();
+    for piece in bench.batch.motions() {
+        let robot = piece.body == BodyKind::Robot.code();
+        let body = piece.id as usize + if robot { 0 } else { ROBOTS };
+        prop_assert_eq!(piece.from, expected[body], "motion starts where it ended");
+        expected[body] = piece.to;
+    }
+    let now = places(bench);
+    for (body, (place, told)) in now.iter().zip(&expected).enumerate() {
+        let gap_m = (place.x - told.x).hypot(place.y - told.y);
+        let moved_m = (place.x - before[body].x).hypot(place.y - before[body].y);
+        prop_assert!(gap_m <= 1e-6, "untold motion of {body}");
+        prop_assert!(moved_m <= TICK_M + 1e-6, "{body} moved {moved_m}");
+    }
+    for i in 0..ROBOTS {
+        let robot = bench.robot(i);
+        prop_assert_eq!(bench.world.times(i).total(), bench.header().tick);
+        let moved = now[i] != before[i];
+        let moving = robot.activity == Activity::Moving.code();
+        prop_assert_eq!(moved, moving);
+        if let Some(object) = index(robot.holding) {
+            prop_assert_eq!(bench.object(object).holder, i as u32);
+            let at = bench
+                .scene
+                .grasp_at(object, scene::vec(bench.object(object).position));
+            prop_assert!((at - scene::vec(robot.position)).norm() < 1e-12);
+        }
+    }
+    for o in 0..OBJECTS {
+        let holders = (0..ROBOTS).filter(|i| bench.robot(*i).holding == o as u32);
+        let object = bench.object(o);
+        prop_assert_eq!(holders.count(), usize::from(object.holder != NONE));
+        if object.holder == NONE {
+            prop_assert_eq!(object.position, object.rest);
+        }
+    }
+    Ok(())
+}
+
+fn run(clearance: bool, slow_grip: bool, acts: &[Act]) -> Result<(Bench, usize), TestCaseError> {
+    let mut bench = Bench::new(scene(clearance, slow_grip));
+    let mut grasps = 0;
+    for act in acts {
+        perform(&mut bench, act);
+        let ticks = if let Act::Wait(ticks) = act {
+            *ticks
+        } else {
+            1
+        };
+        for _ in 0..ticks {
+            let before = places(&bench);
+            let (epoch, tick) = (bench.header().epoch, bench.header().tick);
+            bench.step();
+            if bench.world.outcome() != Outcome::Running {
+                return Ok((bench, grasps));
+            }
+            prop_assert_eq!(bench.header().tick, tick + 1);
+            prop_assert!(bench.header().epoch - epoch <= 1);
+            check(&bench, &before)?;
+            grasps += bench.events(shm_types::EventKind::Grasped).len();
+        }
+    }
+    Ok((bench, grasps))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(96))]
+
+    #[test]
+    fn whatever_is_commanded_the_invariants_hold(
+        clearance in any::<bool>(),
+        slow_grip in any::<bool>(),
+        acts in proptest::collection::vec(act(), 1..80),
+    ) {
+        let (bench, _) = run(clearance, slow_grip, &acts)?;
+        prop_assert_eq!(bench.world.counters().violations, 0);
+    }
+
+    #[test]
+    fn the_same_commands_give_the_same_hash(
+        acts in proptest::collection::vec(act(), 1..40),
+    ) {
+        let (one, _) = run(false, true, &acts)?;
+        let (other, _) = run(false, true, &acts)?;
+        prop_assert_eq!(one.header().state_hash, other.header().state_hash);
+    }
+}
+
+/// The strategy is worth something only if things do get moved by it.
+#[test]
+fn random_commands_grasp_and_move_objects() {
+    use proptest::strategy::ValueTree;
+    use proptest::test_runner::TestRunner;
+
+    let mut runner = TestRunner::deterministic();
+    let mut grasped = 0;
+    for _ in 0..60 {
+        let acts = proptest::collection::vec(act(), 60..80)
+            .new_tree(&mut runner)
+            .unwrap();
+        grasped += run(false, false, &acts.current()).unwrap().1;
+    }
+    assert!(grasped >= 20, "only {grasped} grasps in 60 runs");
+}
