@@ -109,11 +109,17 @@ pub(crate) struct GenerateArgs {
     #[arg(long, value_name = "M", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=MAX_ROBOTS))]
     pub(crate) robots: u32,
     /// Free floor, square metres
-    #[arg(long, value_name = "M2", default_value_t = 40.0, value_parser = number(4.0, 100_000.0))]
+    #[arg(long, value_name = "M2", default_value_t = 17.0, value_parser = number(1.0, 10_000.0))]
     pub(crate) area: f64,
-    /// Number of inner walls
-    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    /// Number of dividing walls, each with a doorway
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=1_000))]
     pub(crate) walls: u32,
+    /// Share of places next to other objects or in doorways
+    #[arg(long, value_name = "SHARE", default_value_t = 0.5, value_parser = number(0.0, 1.0))]
+    pub(crate) crowding: f64,
+    /// Moves beyond one an object
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    pub(crate) extra_moves: u32,
     /// Write to this file instead of stdout
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,

@@ -29,7 +29,9 @@ impl Progress {
             ProgressDrawTarget::hidden()
         };
         let bar = ProgressBar::with_draw_target(Some(goals as u64), target);
-        if let Ok(style) = ProgressStyle::with_template("[{bar:20}] {pos}/{len} objects  {wide_msg}") {
+        if let Ok(style) =
+            ProgressStyle::with_template("[{bar:20}] {pos}/{len} objects  {wide_msg}")
+        {
             bar.set_style(style.progress_chars("=> "));
         }
         bar.set_message("starting");
@@ -83,7 +85,12 @@ fn message(snapshot: Checked<'_, WorldSnapshot>) -> String {
         let phases: Vec<_> = phases.collect();
         Phase::ALL
             .iter()
-            .map(|phase| (*phase, phases.iter().filter(|other| *other == phase).count()))
+            .map(|phase| {
+                (
+                    *phase,
+                    phases.iter().filter(|other| *other == phase).count(),
+                )
+            })
             .filter(|(_, count)| *count > 0)
             .map(|(phase, count)| format!("{count} {}", word(phase)))
             .collect::<Vec<_>>()

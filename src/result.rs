@@ -188,10 +188,16 @@ impl Times {
             .map(|ticks| RobotTimes::from_ticks(ticks, tick_ns))
             .collect();
         let count = per_robot.len() as f64;
-        let sum = per_robot.iter().copied().reduce(|a, b| a.with(b, |a, b| a + b))?;
+        let sum = per_robot
+            .iter()
+            .copied()
+            .reduce(|a, b| a.with(b, |a, b| a + b))?;
         Some(Self {
             mean: sum.with(sum, |a, _| a / count),
-            max: per_robot.iter().copied().reduce(|a, b| a.with(b, f64::max))?,
+            max: per_robot
+                .iter()
+                .copied()
+                .reduce(|a, b| a.with(b, f64::max))?,
             per_robot,
         })
     }
@@ -260,8 +266,20 @@ mod tests {
     #[test]
     fn means_of_the_activities_make_the_makespan() {
         let robots = [
-            ActivityReport { moving: 60, computing: 10, waiting: 5, gripping: 5, idle: 20 },
-            ActivityReport { moving: 0, computing: 30, waiting: 0, gripping: 0, idle: 70 },
+            ActivityReport {
+                moving: 60,
+                computing: 10,
+                waiting: 5,
+                gripping: 5,
+                idle: 20,
+            },
+            ActivityReport {
+                moving: 0,
+                computing: 30,
+                waiting: 0,
+                gripping: 0,
+                idle: 70,
+            },
         ];
         let times = Times::new(&robots, 10_000_000).unwrap();
         let mean = times.mean;

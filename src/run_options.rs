@@ -214,7 +214,10 @@ impl RunArgs {
 
     /// World time of a tick, ns.
     fn tick_ns(&self) -> u64 {
-        let lockstep = self.time.tick.map_or(Settings::default().tick_ns, |ms| ns(ms / 1e3));
+        let lockstep = self
+            .time
+            .tick
+            .map_or(Settings::default().tick_ns, |ms| ns(ms / 1e3));
         self.clock().tick_ns(lockstep)
     }
 
@@ -226,7 +229,10 @@ impl RunArgs {
             hard: self.method.hard,
             performance: self.method.performance,
             compute: self.method.compute,
-            units_per_second: self.method.units_per_second.unwrap_or(default.units_per_second),
+            units_per_second: self
+                .method
+                .units_per_second
+                .unwrap_or(default.units_per_second),
             tick_ns: self.tick_ns(),
             time_limit_ns: self.time.time_limit.map_or(default.time_limit_ns, ns),
             ..default
@@ -254,19 +260,27 @@ const MAX_NAME: usize = 32;
 fn run_name(text: &str) -> Result<String, String> {
     let fine = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if text.is_empty() || text.len() > MAX_NAME || !text.chars().all(fine) {
-        return Err(format!("must be 1 to {MAX_NAME} letters, digits, '-' and '_'"));
+        return Err(format!(
+            "must be 1 to {MAX_NAME} letters, digits, '-' and '_'"
+        ));
     }
     Ok(text.to_owned())
 }
 
 fn delay(text: &str) -> Result<Delay, String> {
-    let (role, duration) = text.split_once('=').ok_or("must be ROLE=MS or ROLE=MSxTICKS")?;
+    let (role, duration) = text
+        .split_once('=')
+        .ok_or("must be ROLE=MS or ROLE=MSxTICKS")?;
     let role: Role = role.parse().map_err(|error| format!("{error}"))?;
     let (ms, ticks) = duration.split_once('x').unwrap_or((duration, ""));
-    let ms = ms.parse().map_err(|error| format!("{ms:?} is no number of milliseconds: {error}"))?;
+    let ms = ms
+        .parse()
+        .map_err(|error| format!("{ms:?} is no number of milliseconds: {error}"))?;
     let ticks = match ticks {
         "" => u64::MAX,
-        ticks => ticks.parse().map_err(|error| format!("{ticks:?} is no number of ticks: {error}"))?,
+        ticks => ticks
+            .parse()
+            .map_err(|error| format!("{ticks:?} is no number of ticks: {error}"))?,
     };
     Ok(Delay { role, ms, ticks })
 }

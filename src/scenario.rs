@@ -3,6 +3,7 @@
 //! Responsible for: which of the two a name means; reading it; cutting it to the robots asked for.
 //! Not responsible for: what a scenario may say (crate `scene`).
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use scene::{BUILTIN, Scene};
@@ -12,6 +13,14 @@ use crate::exit::{Exit, Failure};
 /// The scenario that is run if none is named.
 pub(crate) const DEFAULT: &str = "e1";
 
+/// A scenario, and what its file says of where it came from.
+#[derive(Debug)]
+pub(crate) struct Loaded {
+    pub(crate) scene: Scene,
+    /// Seed it was generated from, if it was.
+    pub(crate) seed: Option<u64>,
+}
+
 /// Reads the scenario called `name`, with its first `robots` robots if that is given.
 ///
 /// A built-in scenario goes by its name, unless that looks like a path: `./paper-68a` and
@@ -19,22 +28,30 @@ pub(crate) const DEFAULT: &str = "e1";
 ///
 /// # Errors
 /// There is none, it is no good, or it has fewer homes than robots asked for.
-pub(crate) fn load(name: &str, robots: Option<u32>) -> Result<Scene, Failure> {
-    let scene = match scene::builtin(name) {
-        Some(builtin) => parse(builtin.text, &format!("built-in {name}"))?,
-        None => parse(&read(name)?, name)?,
+pub(crate) fn load(name: &str, robots: Option<u32>) -> Result<Loaded, Failure> {
+    let (text, source) = match scene::builtin(name) {
+        Some(builtin) => (Cow::Borrowed(builtin.text), format!("built-in {name}")),
+        None => (Cow::Owned(read(name)?), name.to_owned()),
     };
-    match robots {
-        None => Ok(scene),
-        Some(robots) => cut(&scene, robots),
-    }
-}
-
-fn parse(text: &str, source: &str) -> Result<Scene, Failure> {
-    scene::parse(text, source).map_err(|error| Failure {
+    let whole = scene::parse(&text, &source).map_err(|error| Failure {
         exit: Exit::BadInput,
         report: error.into(),
+    })?;
+    Ok(Loaded {
+        scene: match robots {
+            None => whole,
+            Some(robots) => cut(&whole, robots)?,
+        },
+        seed: seed(&text),
     })
+}
+
+/// The seed in the opening comment of a generated file.
+fn seed(text: &str) -> Option<u64> {
+    let comment = text.lines().map_while(|line| line.strip_prefix('#'));
+    let mut words = comment.flat_map(str::split_whitespace);
+    words.find(|word| *word == "--seed")?;
+    words.next()?.parse().ok()
 }
 
 fn read(name: &str) -> Result<String, Failure> {
@@ -79,6 +96,15 @@ mod tests {
     #[test]
     fn the_default_is_inside_the_binary() {
         assert!(load(DEFAULT, None).is_ok());
+    }
+
+    #[test]
+    fn a_generated_file_tells_its_seed() {
+        assert_eq!(
+            seed("# rearrange generate --seed 7 --objects 5\nname = 1"),
+            Some(7)
+        );
+        assert_eq!(seed("name = \"--seed 7\""), None);
     }
 
     #[test]

@@ -13,7 +13,11 @@ pub(crate) fn render(result: &RunResult, colour: bool) -> String {
     let outcome = Cell::new(outcome(result));
     table.add_row(vec![
         Cell::new("outcome"),
-        if colour { outcome.fg(shade(result)) } else { outcome },
+        if colour {
+            outcome.fg(shade(result))
+        } else {
+            outcome
+        },
     ]);
     for (name, value) in rows(result) {
         table.add_row(vec![name, &value]);
@@ -35,7 +39,11 @@ pub(crate) fn plain() -> Table {
 
 /// The table's text without blanks at the ends of lines.
 pub(crate) fn finish(table: &Table) -> String {
-    table.to_string().lines().map(|line| format!("{}\n", line.trim())).collect()
+    table
+        .to_string()
+        .lines()
+        .map(|line| format!("{}\n", line.trim()))
+        .collect()
 }
 
 fn shade(result: &RunResult) -> Color {
@@ -63,9 +71,9 @@ fn rows(result: &RunResult) -> Vec<(&'static str, String)> {
         ),
     )];
     if let Some(makespan) = result.makespan_s {
-        let bound = result
-            .lower_bound_s
-            .map_or_else(String::new, |bound| format!(" (no plan is shorter than {bound:.2} s)"));
+        let bound = result.lower_bound_s.map_or_else(String::new, |bound| {
+            format!(" (no plan is shorter than {bound:.2} s)")
+        });
         rows.push(("makespan", format!("{makespan:.2} s of world time{bound}")));
     }
     if let Some(times) = &result.times {
@@ -75,7 +83,10 @@ fn rows(result: &RunResult) -> Vec<(&'static str, String)> {
             mean.moving_s, mean.computing_s, mean.waiting_s, mean.gripping_s, mean.idle_s
         );
         rows.push(("per robot", line));
-        rows.push(("most computing", format!("{:.2} s by one robot", max.computing_s)));
+        rows.push((
+            "most computing",
+            format!("{:.2} s by one robot", max.computing_s),
+        ));
     }
     rows.push((
         "work",
@@ -92,7 +103,11 @@ fn rows(result: &RunResult) -> Vec<(&'static str, String)> {
         ),
     ));
     if let Some(checker) = &result.checker {
-        let complete = if checker.complete { "" } else { ", but the trace is incomplete" };
+        let complete = if checker.complete {
+            ""
+        } else {
+            ", but the trace is incomplete"
+        };
         let line = format!(
             "{} violations in {} swept tests{complete}",
             checker.violations, checker.swept_tests

@@ -79,7 +79,7 @@ fn kernel() -> String {
 /// Seconds since 1970 as a date of the Gregorian calendar (H. Hinnant, "chrono-compatible
 /// low-level date algorithms": days counted in eras of 400 years that begin on 1 March).
 fn format_utc(seconds: u64) -> String {
-    let (days, rest) = (seconds / SECONDS_PER_DAY, seconds % NS_PER_DAY_SECOND);
+    let (days, rest) = (seconds / SECONDS_PER_DAY, seconds % SECONDS_PER_DAY);
     let days = days + 719_468;
     let (era, day_of_era) = (days / 146_097, days % 146_097);
     let year_of_era =

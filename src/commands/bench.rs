@@ -16,7 +16,7 @@ use crate::{output, scenario, table};
 
 /// Measures world time per wall time with both drivers.
 pub(crate) fn speed(args: &SpeedArgs) -> Outcome {
-    let scene = scenario::load(&args.scenario, args.robots)?;
+    let scene = scenario::load(&args.scenario, args.robots)?.scene;
     if let Some(proof) = planner::certificate(&scene) {
         let message = format!("{} cannot be solved: {proof}", scene.name);
         return Err(Failure::new(Exit::Infeasible, message));
@@ -47,12 +47,19 @@ fn once(plan: &RunPlan) -> Result<Run, Failure> {
             ticks: report.world.ticks,
             world_s: report.world.time_ns as f64 / 1e9,
             wall_s: report.wall_s,
-            moving: report.world.activities.iter().map(|robot| robot.moving).sum(),
+            moving: report
+                .world
+                .activities
+                .iter()
+                .map(|robot| robot.moving)
+                .sum(),
         }),
         RunOutcome::Interrupted => Err(Failure::new(Exit::Interrupted, "interrupted")),
         outcome => {
             let reason = report.reason.unwrap_or_default();
-            Err(Failure::system(format!("a run ended as {outcome:?}: {reason}")))
+            Err(Failure::system(format!(
+                "a run ended as {outcome:?}: {reason}"
+            )))
         }
     }
 }
@@ -60,7 +67,15 @@ fn once(plan: &RunPlan) -> Result<Run, Failure> {
 fn text(report: &Report) -> String {
     let mut table = table::plain();
     table.set_header([
-        "DRIVER", "PROCESSES", "RUNS", "TICKS", "WORLD s", "WALL s", "WORLD/WALL", "µs/TICK", "MOVING",
+        "DRIVER",
+        "PROCESSES",
+        "RUNS",
+        "TICKS",
+        "WORLD s",
+        "WALL s",
+        "WORLD/WALL",
+        "µs/TICK",
+        "MOVING",
     ]);
     for row in &report.rows {
         table.add_row(cells(row));

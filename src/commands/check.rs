@@ -13,8 +13,8 @@ use crate::output;
 
 /// Checks a trace; status 6 if something in it is not legal, 3 if it is no trace at all.
 pub(crate) fn main(args: &CheckArgs) -> Outcome {
-    let report = trace::check_file(&args.trace)
-        .map_err(|error| Failure::new(Exit::BadInput, error))?;
+    let report =
+        trace::check_file(&args.trace).map_err(|error| Failure::new(Exit::BadInput, error))?;
     if args.json {
         output::print_json(&report)?;
     } else {
@@ -24,7 +24,10 @@ pub(crate) fn main(args: &CheckArgs) -> Outcome {
         return Ok(Exit::Invariant);
     }
     if report.truncated {
-        return Err(Failure::new(Exit::BadInput, truncated(&args.trace, &report)));
+        return Err(Failure::new(
+            Exit::BadInput,
+            truncated(&args.trace, &report),
+        ));
     }
     Ok(Exit::Success)
 }

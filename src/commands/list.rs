@@ -19,7 +19,15 @@ pub(crate) fn main(args: &ListArgs) -> Outcome {
         return Ok(Exit::Success);
     }
     let mut table = table::plain();
-    table.set_header(["ID", "NAME", "SCENARIO", "ROBOTS", "CLOCK", "PID", "DIRECTORY"]);
+    table.set_header([
+        "ID",
+        "NAME",
+        "SCENARIO",
+        "ROBOTS",
+        "CLOCK",
+        "PID",
+        "DIRECTORY",
+    ]);
     for run in &runs {
         table.add_row([
             run.id.clone(),

@@ -14,6 +14,7 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::progress::Progress;
 use crate::result::{Checker, Counts, Ending, Options, RunResult, Times, hex, seconds};
 use crate::run_options::{Driver, RunArgs};
+use crate::scenario::Loaded;
 use crate::{lower_bound, output, result, scenario, table};
 
 /// Violations quoted in the result.
@@ -23,9 +24,12 @@ const MOST_QUOTED: usize = 10;
 pub(crate) fn main(args: &RunArgs) -> Outcome {
     args.check()
         .map_err(|error| Failure::new(Exit::Usage, error))?;
-    let scene = scenario::load(&args.scenario, args.robots)?;
+    let Loaded { scene, seed } = scenario::load(&args.scenario, args.robots)?;
     let options = options(args);
-    let frame = frame(&scene, args, &options);
+    let frame = RunResult {
+        seed,
+        ..frame(&scene, args, &options)
+    };
     let result = match planner::certificate(&scene) {
         Some(proof) => infeasible(frame, &proof),
         None => {

@@ -26,7 +26,10 @@ fn find(name: &str) -> Result<&'static Builtin, Failure> {
         let names: Vec<_> = BUILTIN.iter().map(|builtin| builtin.name).collect();
         Failure::new(
             Exit::Usage,
-            format!("no built-in scenario is called {name}; there are {}", names.join(", ")),
+            format!(
+                "no built-in scenario is called {name}; there are {}",
+                names.join(", ")
+            ),
         )
     })
 }

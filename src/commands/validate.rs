@@ -15,7 +15,7 @@ use crate::{output, scenario};
 
 /// Says ok with a summary, what is wrong (status 3), or why it cannot be solved (status 4).
 pub(crate) fn main(args: &ValidateArgs) -> Outcome {
-    let scene = scenario::load(&args.scenario, args.robots)?;
+    let scene = scenario::load(&args.scenario, args.robots)?.scene;
     if let Some(proof) = planner::certificate(&scene) {
         return Err(Failure::new(
             Exit::Infeasible,
@@ -82,7 +82,12 @@ fn easy(scene: &Scene) -> String {
     } else {
         Kind::EASY
             .iter()
-            .map(|kind| (kind, found.iter().filter(|(other, ..)| other == kind).count()))
+            .map(|kind| {
+                (
+                    kind,
+                    found.iter().filter(|(other, ..)| other == kind).count(),
+                )
+            })
             .map(|(kind, count)| format!("{count} of {kind:?}"))
             .collect()
     };

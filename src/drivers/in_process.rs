@@ -37,8 +37,8 @@ pub(crate) fn run(
         .map_err(|error| Failure::system(format!("signals cannot be watched: {error}")))?;
     let record = SceneRecord::new(scene, &options.settings, RUN_ID);
     let every_ns = (1e9 / options.state_rate_hz) as u64;
-    let mut recording = Recording::start(options.trace.as_deref(), &record, every_ns)
-        .map_err(Failure::system)?;
+    let mut recording =
+        Recording::start(options.trace.as_deref(), &record, every_ns).map_err(Failure::system)?;
     let mut hashes = options.hashes.as_deref().map(create).transpose()?;
 
     let mut simulation = Simulation::new(scene, &options.settings, RUN_ID);

@@ -32,7 +32,9 @@ pub(crate) fn run(
     let mut finished = finished(report);
     match check {
         Ok(check) => finished.check = check,
-        Err(error) => finished.notes.push(format!("the trace cannot be checked: {error}")),
+        Err(error) => finished
+            .notes
+            .push(format!("the trace cannot be checked: {error}")),
     }
     Ok(finished)
 }

@@ -9,7 +9,6 @@ use std::io::{self, BufReader, BufWriter, Seek};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use scene::Scene;
 use shm_types::{Checked, MotionBatch, WorldSnapshot};
 use trace::{CheckReport, Ending, SceneRecord, WriteError, Writer};
 
@@ -100,7 +99,9 @@ impl Recording {
 
 /// A file that has no name any more: nothing is left of it whatever happens.
 fn nameless() -> Result<File, RecordingError> {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let since = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
     let name = format!("rearrange-{}-{}.mcap", std::process::id(), since.as_nanos());
     let path = std::env::temp_dir().join(name);
     let file = create(&path, true)?;
