@@ -33,7 +33,23 @@ macro_rules! builtin {
 }
 
 /// Every shipped scenario.
-pub const BUILTIN: &[Builtin] = builtin!["e1", "h1", "swap",];
+pub const BUILTIN: &[Builtin] = builtin![
+    "e1",
+    "e2",
+    "e3",
+    "e4",
+    "h1",
+    "h2",
+    "blocked-approach",
+    "blocked-return",
+    "swap",
+    "joint-blockers",
+    "head-on-corridor",
+    "lift-from-below",
+    "infeasible-e1-cycle",
+    "infeasible-e4-cycle",
+    "unreachable-goal",
+];
 
 /// The shipped scenario of this name.
 #[must_use]

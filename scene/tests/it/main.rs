@@ -2,3 +2,4 @@
 
 mod cspace;
 mod geometry;
+mod shipped;
