@@ -85,16 +85,24 @@ impl Frontier {
         self.started = false;
     }
 
+    /// Whether a way to `cell` that costs `cost` is better than what is known: only then is it
+    /// worth offering.
+    #[inline]
+    pub(crate) fn improves(&self, cell: u32, cost: u32) -> bool {
+        let node = &self.nodes[cell as usize];
+        node.round != self.round || cost < node.cost && node.previous != SERVED
+    }
+
     /// Offers a way to `cell` that costs `cost`, reached from `from`; `bound` is a lower bound
     /// of what remains from there, always the same for one point of one search. Kept only if
     /// it is better than what is known.
     #[inline]
     pub(crate) fn offer(&mut self, cell: u32, from: u32, cost: u32, bound: u32) {
+        if !self.improves(cell, cost) {
+            return;
+        }
         let node = self.nodes[cell as usize];
         if node.round == self.round {
-            if node.cost <= cost || node.previous == SERVED {
-                return;
-            }
             self.unlink(cell, node, node.cost + bound);
         }
         if !self.started {

@@ -208,12 +208,14 @@ impl PathSearch {
         while steps != 0 {
             let direction = steps.trailing_zeros() as usize;
             steps &= steps - 1;
-            let (right, up) = DIRECTIONS[direction];
-            let place = (x.wrapping_add_signed(right), y.wrapping_add_signed(up));
             let next = cell.wrapping_add_signed(offsets[direction]);
-            let bound = self.target.bound(place, connectivity);
-            self.frontier
-                .offer(next, cell, cost + STEP_COSTS[direction], bound);
+            let cost = cost + STEP_COSTS[direction];
+            if self.frontier.improves(next, cost) {
+                let (right, up) = DIRECTIONS[direction];
+                let place = (x.wrapping_add_signed(right), y.wrapping_add_signed(up));
+                let bound = self.target.bound(place, connectivity);
+                self.frontier.offer(next, cell, cost, bound);
+            }
         }
     }
 

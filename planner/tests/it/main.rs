@@ -1,0 +1,6 @@
+//! The planner as its users see it.
+
+mod field;
+mod room;
+mod search;
+mod speed;
