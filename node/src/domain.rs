@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use shm_types::Counts;
 use shm_types::capacity::LAYOUT_VERSION;
 
-use crate::options::{Role, RunOptions};
+use crate::options::{Clock, Role, RunOptions};
 use crate::shared_memory;
 
 /// Longest root and prefix together, bytes: event sockets fail beyond.
@@ -122,6 +122,12 @@ pub struct Process {
 }
 
 impl RunFile {
+    /// Its id as a number; 0 for an id that is none.
+    #[must_use]
+    pub fn id_number(&self) -> u64 {
+        u64::from_str_radix(&self.id, 16).unwrap_or(0)
+    }
+
     /// Robots and objects.
     #[must_use]
     pub const fn counts(&self) -> Counts {
@@ -276,12 +282,46 @@ impl Drop for RunDirectory {
     }
 }
 
+/// A live run, as `list` tells it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LiveRun {
+    /// Eight hexadecimal digits.
+    pub id: String,
+    /// Its name.
+    pub name: String,
+    /// Its directory.
+    pub directory: PathBuf,
+    /// Process id of its supervisor.
+    pub supervisor_pid: u32,
+    /// Name of its scenario.
+    pub scenario: String,
+    /// Robots that take part.
+    pub robots: u32,
+    /// Who sets the pace.
+    pub clock: Clock,
+}
+
+impl From<RunFile> for LiveRun {
+    fn from(run: RunFile) -> Self {
+        Self {
+            id: run.id,
+            name: run.name,
+            directory: run.root,
+            supervisor_pid: run.supervisor_pid,
+            scenario: run.scenario,
+            robots: run.robots,
+            clock: run.options.clock,
+        }
+    }
+}
+
 /// Every live run of this user, by id. Sweeps away what dead ones have left.
 ///
 /// # Errors
 /// The directory of runs is not private, or the system refused.
-pub fn list() -> Result<Vec<RunFile>, DomainError> {
-    Runs::open()?.live()
+pub fn list() -> Result<Vec<LiveRun>, DomainError> {
+    let live = Runs::open()?.live()?;
+    Ok(live.into_iter().map(LiveRun::from).collect())
 }
 
 /// The directory of all runs of this user, locked against other starts and lists.

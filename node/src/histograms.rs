@@ -6,10 +6,12 @@
 //! Terms: a *name* says what was timed; see [`Timed`].
 
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use hdrhistogram::Histogram;
 use hdrhistogram::serialization::{Deserializer, Serializer, V2Serializer};
+
+use crate::options::Role;
 
 /// Longest duration told apart, ns: a minute. Longer ones count as this.
 const HIGHEST_NS: u64 = 60_000_000_000;
@@ -146,6 +148,12 @@ impl Latencies {
             let histogram = self.histogram(timed);
             (!histogram.is_empty()).then(|| (timed, summary(histogram)))
         })
+    }
+
+    /// Where a participant leaves its latencies.
+    #[must_use]
+    pub fn path(run_dir: &Path, role: Role) -> PathBuf {
+        run_dir.join(format!("{role}.latencies"))
     }
 
     /// Keeps them in a file: for each name the length of its histogram and the histogram, in

@@ -166,7 +166,7 @@ pub struct RunOptions {
     pub state_rate_hz: f64,
     /// Participants made slow on purpose.
     pub delays: Vec<Delay>,
-    /// Where the recorder writes; nowhere if none.
+    /// Where the recorder writes; if none, in the run's directory, which goes with the report.
     pub trace: Option<PathBuf>,
     /// Where the world writes the state hash of each tick, one line each; nowhere if none.
     pub hashes: Option<PathBuf>,

@@ -3,6 +3,8 @@
 //! Responsible for: the files processes leave in the run's directory at exit, and the sum of them.
 //! Not responsible for: what is printed (the binary's) or what was measured (`histograms`).
 
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -34,7 +36,7 @@ pub struct RoleReport {
     /// What only the world knows.
     pub world: Option<WorldReport>,
     /// What only the recorder knows.
-    pub recorder: Option<RecorderReport>,
+    pub recorder: Option<RecorderSummary>,
 }
 
 /// [`Counters`], as they are kept in a file.
@@ -132,10 +134,12 @@ pub struct WorldReport {
 
 /// What the recorder knows at the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct RecorderReport {
+pub struct RecorderSummary {
     /// Batches written.
     pub batches: u64,
-    /// Whether no batch was missed.
+    /// Batches that never reached it.
+    pub lost: u64,
+    /// Whether no batch is missing, the last one included.
     pub complete: bool,
 }
 
@@ -168,18 +172,60 @@ pub struct RunReport {
     pub wall_s: f64,
     /// Whether there were more processes than cores.
     pub oversubscribed: bool,
-    /// Where the trace is, if one was written. In the run's directory, unless the plan named
-    /// another place: then it goes when this report is dropped.
+    /// Where the trace can be read, if there is one. Unless the plan named a place for it, it has
+    /// no name any more, can be read only by this process, and goes when this report is dropped.
     pub trace: Option<PathBuf>,
     /// Things a user should know.
     pub notes: Vec<String>,
-    pub(crate) _directory: Option<crate::domain::RunDirectory>,
+    pub(crate) _trace: Option<fs::File>,
 }
 
 impl RoleReport {
+    /// What is known of a process that has left no report.
+    pub(crate) const fn missing(role: Role, pid: u32) -> Self {
+        Self {
+            role,
+            pid,
+            ticks_answered: 0,
+            cpu_s: 0.0,
+            deadline_misses: 0,
+            lost: 0,
+            counters: WorkReport {
+                polygon_tests: 0,
+                path_plans: 0,
+                cells_expanded: 0,
+                selections: 0,
+                easy_constraints: 0,
+                units: 0,
+            },
+            notes: Vec::new(),
+            world: None,
+            recorder: None,
+        }
+    }
+
     /// Where a participant leaves its report.
     #[must_use]
     pub fn path(run_dir: &Path, role: Role) -> PathBuf {
         run_dir.join(format!("{role}.report.json"))
+    }
+
+    /// Leaves it.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(crate) fn write(&self, run_dir: &Path) -> io::Result<()> {
+        let text = serde_json::to_vec(self)?;
+        fs::write(Self::path(run_dir, self.role), text)
+    }
+
+    /// Reads what a participant has left.
+    ///
+    /// # Errors
+    /// It has left nothing, or nothing of this version.
+    pub(crate) fn read(run_dir: &Path, role: Role) -> io::Result<Self> {
+        Ok(serde_json::from_slice(&fs::read(Self::path(
+            run_dir, role,
+        ))?)?)
     }
 }

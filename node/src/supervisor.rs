@@ -2,15 +2,45 @@
 //!
 //! Responsible for: readiness, silence, death, interruption, and one report of it all.
 //! Not responsible for: what the processes do, or what is printed of it.
+//!
+//! Terms: a participant is *ready* once it has answered its first tick; until then it is in
+//! *set-up*. It is *lost* when its process ends before the run does.
+//!
+//! In this version a lost participant ends the run, with one exception: in real time a robot that
+//! is silent for too long is killed and declared gone, and the others go on around it.
 
-use shm_types::{Checked, WorldSnapshot};
+mod ending;
+mod signals;
+mod watch;
 
-use crate::options::{OptionError, RunPlan};
+use std::io;
+use std::time::{Duration, Instant};
+
+use shm_types::{Checked, ControlKind, ControlRequest, Outcome, RoleKind, WorldSnapshot};
+use world::FIRST_INCARNATION;
+
+use crate::children::Participant;
+use crate::domain::{DomainError, NewRun, Process, RunDirectory, RunFile};
+use crate::options::{self, Clock, OptionError, Role, RunPlan};
+use crate::ports::{self, IpcNode, TopicError};
 use crate::report::RunReport;
+use crate::shared_memory::{self, ResourceError};
+use crate::topics::{HeldTopics, Topics};
+use signals::Signals;
+use watch::Watch;
+
+/// Sleep between two looks at the processes.
+const PERIOD: Duration = Duration::from_millis(5);
+/// Wall time between two calls of [`Observer::progress`].
+const PROGRESS_EVERY: Duration = Duration::from_millis(100);
+/// How often set-up is tried.
+const SET_UP_ATTEMPTS: u32 = 3;
+/// How long the world may take to end the run once it is asked to.
+const STOP_GRACE: Duration = Duration::from_secs(3);
 
 /// Told how a run is going. Called from the thread that runs the supervisor.
 pub trait Observer {
-    /// All participants have answered their first tick. `pids` are in the order of the roles.
+    /// All participants have answered their first tick.
     fn started(&mut self, run: &str) {
         let _ = run;
     }
@@ -39,6 +69,54 @@ pub enum RunError {
     /// The plan's scenario is none (a bug of the caller: it comes from a parsed scenario).
     #[error("could not read the run's own scenario: {0}")]
     Scenario(String),
+    /// The run has no place to live.
+    #[error(transparent)]
+    Domain(#[from] DomainError),
+    /// The machine has no room for it.
+    #[error(transparent)]
+    Resources(#[from] ResourceError),
+    /// Shared memory failed.
+    #[error(transparent)]
+    Topics(#[from] TopicError),
+    /// Signals cannot be caught.
+    #[error("could not watch for signals: {0}")]
+    Signals(io::Error),
+    /// A process could not be started.
+    #[error("could not start {role} with {program}: {source}")]
+    Start {
+        /// Which.
+        role: Role,
+        /// The executable.
+        program: String,
+        /// Why not.
+        source: io::Error,
+    },
+    /// A process ended before it had answered its first tick.
+    #[error("a process failed while it was setting up: {0}")]
+    SetUp(String),
+    /// Participants never answered their first tick, however often they were started.
+    #[error(
+        "{roles} did not answer a first tick within {seconds} s, {attempts} times over; is the \
+         machine overloaded?"
+    )]
+    Unready {
+        /// Who.
+        roles: String,
+        /// The deadline of each attempt.
+        seconds: f64,
+        /// How often it was tried.
+        attempts: u32,
+    },
+}
+
+/// How the watch over a run came to its end.
+enum End {
+    /// The world has said so.
+    Outcome(Outcome),
+    /// Somebody asked for it, and the world did not come to say so.
+    Interrupted,
+    /// A participant was lost: the reason.
+    Lost(String),
 }
 
 /// Runs a plan to its end.
@@ -46,6 +124,260 @@ pub enum RunError {
 /// # Errors
 /// The run could not be started; nothing of it is left.
 pub fn run(plan: &RunPlan, observer: &mut dyn Observer) -> Result<RunReport, RunError> {
-    let _ = (plan, observer);
-    todo!()
+    let mut run = Run::prepare(plan)?;
+    let end = match run.set_up()? {
+        Some(end) => end,
+        None => {
+            observer.started(&run.file.name);
+            run.attend(observer)?
+        }
+    };
+    let report = run.wind_up(end);
+    for note in &report.notes {
+        observer.note(note);
+    }
+    Ok(report)
+}
+
+/// A run and all its processes. Fields are dropped in this order: processes before shared memory,
+/// shared memory before the directory.
+struct Run<'p> {
+    plan: &'p RunPlan,
+    participants: Vec<Participant>,
+    watch: Watch,
+    _topics: HeldTopics,
+    node: IpcNode,
+    directory: RunDirectory,
+    file: RunFile,
+    signals: Signals,
+    requests: u64,
+    restarts: u64,
+    notes: Vec<String>,
+    started: Instant,
+    oversubscribed: bool,
+}
+
+impl<'p> Run<'p> {
+    /// Checks what can be checked, and makes the place and the topics of the run.
+    fn prepare(plan: &'p RunPlan) -> Result<Self, RunError> {
+        let scene = scene::parse(&plan.scenario, "scenario.toml")
+            .map_err(|error| RunError::Scenario(error.plain()))?;
+        let counts = scene.counts();
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        plan.options.check(counts, cores)?;
+        let topics = Topics::of(counts, plan.options.monitors);
+        let participants = u64::from(counts.robots + plan.options.monitors) + 4;
+        shared_memory::reserve(topics.bytes(), participants)?;
+        let signals = Signals::watch().map_err(RunError::Signals)?;
+        let mut options = plan.options.clone();
+        options.settings.tick_ns = options.clock.tick_ns(options.settings.tick_ns);
+        let (directory, file) = RunDirectory::create(&NewRun {
+            name: plan.name.as_deref(),
+            scenario_text: &plan.scenario,
+            scenario: &scene.name,
+            scenario_hash: scene.hash,
+            counts,
+            shared_memory_bytes: topics.bytes(),
+            options: &options,
+        })?;
+        let node = ports::join(&file.root, &file.prefix, "supervisor")?;
+        make_private(&file)?;
+        let topics = topics.create(&node)?;
+        Ok(Self {
+            plan,
+            participants: Vec::new(),
+            watch: Watch::new(&topics, &file)?,
+            _topics: topics,
+            node,
+            directory,
+            signals,
+            requests: 0,
+            restarts: 0,
+            notes: Vec::new(),
+            started: Instant::now(),
+            oversubscribed: options::processes(counts) > cores,
+            file,
+        })
+    }
+
+    /// Starts every role, and again those that do not get ready in time: a process killed while
+    /// it was setting up can leave a half-made file that blocks everybody after it.
+    fn set_up(&mut self) -> Result<Option<End>, RunError> {
+        for _ in 0..SET_UP_ATTEMPTS {
+            self.start_missing()?;
+            let deadline = Instant::now() + self.plan.setup_deadline;
+            while Instant::now() < deadline {
+                self.watch.look()?;
+                if self.watch.all_are_ready() {
+                    self.watch.set_up_is_over();
+                    self.started = Instant::now();
+                    return Ok(None);
+                }
+                if self.signals.take() {
+                    return Ok(Some(End::Interrupted));
+                }
+                if let Some(words) = self.lost() {
+                    return Err(RunError::SetUp(words));
+                }
+                std::thread::sleep(PERIOD);
+            }
+            self.give_up_unready();
+        }
+        Err(RunError::Unready {
+            roles: names(&self.watch.unready()),
+            seconds: self.plan.setup_deadline.as_secs_f64(),
+            attempts: SET_UP_ATTEMPTS,
+        })
+    }
+
+    fn start_missing(&mut self) -> Result<(), RunError> {
+        for role in Role::all(self.file.robots) {
+            if self.participants.iter().any(|one| one.role == role) {
+                continue;
+            }
+            let launcher = &self.plan.launcher;
+            let participant = Participant::start(launcher, role, self.directory.path());
+            self.participants
+                .push(participant.map_err(|source| RunError::Start {
+                    role,
+                    program: launcher.program.display().to_string(),
+                    source,
+                })?);
+        }
+        self.participants.sort_by_key(|one| one.role);
+        self.file.processes = self
+            .participants
+            .iter()
+            .map(|one| Process {
+                role: one.role,
+                pid: one.pid(),
+            })
+            .collect();
+        Ok(self.directory.write_run(&self.file)?)
+    }
+
+    /// Kills and reaps every process that is still in set-up, then removes what such a process
+    /// can have left half-made.
+    fn give_up_unready(&mut self) {
+        let unready = self.watch.unready();
+        for one in &mut self.participants {
+            if unready.contains(&one.role) {
+                one.kill();
+            }
+        }
+        self.participants.retain(|one| !unready.contains(&one.role));
+        self.restarts += unready.len() as u64;
+        self.notes.push(format!(
+            "{} did not get ready in time and had to be started again",
+            names(&unready)
+        ));
+        self.node.try_cleanup_dead_nodes();
+        match shared_memory::remove_half_made(&self.file.prefix) {
+            Ok(0) => {}
+            Ok(files) => self.notes.push(format!("{files} half-made files removed")),
+            Err(error) => self
+                .notes
+                .push(format!("half-made files not removed: {error}")),
+        }
+        if let Err(error) = make_private(&self.file) {
+            self.notes.push(error.to_string());
+        }
+    }
+
+    /// Watches until the run is over.
+    fn attend(&mut self, observer: &mut dyn Observer) -> Result<End, RunError> {
+        let mut stop_by: Option<Instant> = None;
+        let mut shown = Instant::now();
+        loop {
+            self.watch.look()?;
+            if let Some(outcome) = self.watch.outcome() {
+                return Ok(End::Outcome(outcome));
+            }
+            if let Some(words) = self.lost() {
+                // It may have left because it has seen the end that we have not.
+                self.watch.look()?;
+                return Ok(self.watch.outcome().map_or(End::Lost(words), End::Outcome));
+            }
+            if self.signals.take() {
+                if stop_by.is_some() {
+                    return Ok(End::Interrupted);
+                }
+                self.ask(ControlKind::Stop, RoleKind::World, 0)?;
+                stop_by = Some(Instant::now() + STOP_GRACE);
+            }
+            if stop_by.is_some_and(|by| Instant::now() > by) {
+                return Ok(End::Interrupted);
+            }
+            if let Some(end) = self.dismiss_silent()? {
+                return Ok(end);
+            }
+            if shown.elapsed() >= PROGRESS_EVERY {
+                shown = Instant::now();
+                self.watch.show(observer);
+            }
+            std::thread::sleep(PERIOD);
+        }
+    }
+
+    /// The last words of a participant whose process has ended, if one has.
+    fn lost(&mut self) -> Option<String> {
+        let mut ended = self
+            .participants
+            .iter_mut()
+            .filter_map(|one| one.ended().is_some().then(|| one.last_words()));
+        ended.next()
+    }
+
+    /// In real time, kills who has been silent for too long. A robot is declared gone; without
+    /// any other participant the run cannot go on.
+    fn dismiss_silent(&mut self) -> Result<Option<End>, RunError> {
+        if self.file.options.clock == Clock::Lockstep {
+            return Ok(None);
+        }
+        let Some(role) = self.watch.silent_for(self.plan.silence_limit) else {
+            return Ok(None);
+        };
+        let seconds = self.plan.silence_limit.as_secs_f64();
+        let words = format!("{role} was silent for {seconds} s and was killed");
+        for one in self.participants.iter_mut().filter(|one| one.role == role) {
+            one.kill();
+        }
+        let Role::Robot(index) = role else {
+            return Ok(Some(End::Lost(words)));
+        };
+        self.participants.retain(|one| one.role != role);
+        self.watch.forget(role);
+        self.node.try_cleanup_dead_nodes();
+        self.ask(ControlKind::Down, RoleKind::Robot, index)?;
+        self.notes.push(words);
+        Ok(None)
+    }
+
+    /// Tells the world.
+    fn ask(&mut self, kind: ControlKind, role: RoleKind, index: u32) -> Result<(), RunError> {
+        self.requests += 1;
+        let request = ControlRequest {
+            id: self.requests,
+            kind: kind.code(),
+            role: role.code(),
+            index,
+            incarnation: FIRST_INCARNATION,
+        };
+        Ok(self.watch.ask(request)?)
+    }
+}
+
+/// Takes the run's files in shared memory away from everybody else.
+fn make_private(file: &RunFile) -> Result<(), RunError> {
+    shared_memory::make_private(&file.prefix)
+        .map_err(|source| DomainError::File {
+            path: shared_memory::SHARED_MEMORY.into(),
+            source,
+        })
+        .map_err(RunError::from)
+}
+
+fn names(roles: &[Role]) -> String {
+    let names: Vec<_> = roles.iter().map(ToString::to_string).collect();
+    names.join(", ")
 }

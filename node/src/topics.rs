@@ -20,9 +20,9 @@ use crate::wakes::{WakeService, Wakes};
 
 /// Batches of motion that wait for the recorder. In real time a longer pause of it leaves a gap
 /// in the trace.
-pub const MOTION_BUFFER: usize = 256;
+pub(crate) const MOTION_BUFFER: usize = 256;
 /// Batches by which the world runs ahead of the recorder in lockstep; then it waits.
-pub const MOTION_WINDOW: u64 = 192;
+pub(crate) const MOTION_WINDOW: u64 = 192;
 /// Senders of control requests: the supervisor, and one other program at a time.
 const CONTROL_CLIENTS: usize = 2;
 /// Participants that are no robots, and the supervisor.

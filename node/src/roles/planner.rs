@@ -1,14 +1,161 @@
-//! The loop around the planner.
+//! The loop around the planner service.
+//!
+//! Responsible for: bringing the planner its snapshot and the questions it may see, in the order
+//! every driver keeps, and carrying off tables, answers and its report.
+//! Not responsible for: anything the planner decides (crate `planner`).
+//!
+//! What a step publishes is sent before its report: whoever has the report has the rest.
 
 use std::path::Path;
 
-use crate::roles::RoleError;
+use planner::{Planner, PlannerInput};
+use shm_types::{
+    Checked, ConstraintTable, Counters, HardAnswer, HardRequest, PlannerReport, WorldSnapshot,
+};
+
+use crate::calls::{OPEN_CALLS, Question, Server};
+use crate::clock;
+use crate::histograms::Timed;
+use crate::options::Role;
+use crate::ports::{Access, Publisher};
+use crate::roles::follower::Follower;
+use crate::roles::{RoleError, Seat, Telling, refused};
+use crate::wakes::Waker;
 
 /// Takes part in the run in `run_dir` until it ends.
 ///
 /// # Errors
 /// Set-up failed, or the run broke off.
 pub fn main(run_dir: &Path) -> Result<(), RoleError> {
-    let _ = run_dir;
-    todo!()
+    let mut seat = Seat::take(run_dir, Role::Planner)?;
+    let robots = seat.run.robots;
+    let mut shell = Shell::new(&seat)?;
+    let mut follower = Follower::new(&seat, robots, robots + 1)?;
+    seat.settle();
+    while let Some(snapshot) = follower.next(&mut seat)? {
+        let snapshot = Checked::new(&*snapshot, seat.counts()).map_err(refused("world"))?;
+        shell.answer(&mut seat, snapshot)?;
+    }
+    let telling = Telling {
+        deadline_misses: follower.deadline_misses(),
+        counters: shell.counters.into(),
+        ..Telling::default()
+    };
+    seat.leave(telling)
+}
+
+/// A question that is not answered yet.
+struct Held {
+    question: Question<HardRequest, HardAnswer>,
+    /// Whether the planner has seen it.
+    seen: bool,
+}
+
+/// The planner and its ports.
+struct Shell {
+    planner: Planner,
+    server: Server<HardRequest, HardAnswer>,
+    /// Questions not answered yet, in the order in which they came.
+    questions: Vec<Held>,
+    /// Those the planner sees in this step, in the order of robots.
+    requests: Vec<HardRequest>,
+    tables: Publisher<ConstraintTable>,
+    outlet: Publisher<PlannerReport>,
+    waker: Option<Waker>,
+    counters: Counters,
+}
+
+impl Shell {
+    fn new(seat: &Seat) -> Result<Self, RoleError> {
+        let (topics, node) = (&seat.topics, &seat.node);
+        let most = seat.run.robots as usize * (OPEN_CALLS + 1);
+        Ok(Self {
+            planner: Planner::new(&seat.scene, seat.options().settings.clone()),
+            server: topics.hard.service(node, Access::Open)?.server()?,
+            questions: Vec::with_capacity(most),
+            requests: Vec::with_capacity(most),
+            tables: topics
+                .constraints
+                .service(node, Access::Open)?
+                .publisher()?,
+            outlet: topics.planner.service(node, Access::Open)?.publisher()?,
+            waker: seat.waker(|| topics.wake_world.service(node, Access::Open)?.waker())?,
+            counters: Counters::default(),
+        })
+    }
+
+    /// One tick: from a snapshot to a report.
+    fn answer(
+        &mut self,
+        seat: &mut Seat,
+        snapshot: Checked<'_, WorldSnapshot>,
+    ) -> Result<(), RoleError> {
+        let header = &snapshot.header;
+        self.receive(seat, header.tick)?;
+        let input = PlannerInput {
+            snapshot,
+            requests: &self.requests,
+        };
+        let units = seat.options().settings.units_per_tick(header.busy);
+        let started_ns = clock::now_ns();
+        let output = self.planner.step(&seat.scene, input, units);
+        seat.record_since(Timed::PlannerStep, started_ns);
+        seat.dawdle();
+        self.tables.connect()?;
+        if let Some(table) = output.table {
+            self.tables.send(|out| out.copy_from(table))?;
+        }
+        for answer in output.answers {
+            let asks = |held: &Held| held.seen && is_answer(&held.question, answer);
+            for held in self.questions.iter().filter(|held| asks(held)) {
+                held.question.answer(*answer)?;
+            }
+            self.questions.retain(|held| !asks(held));
+        }
+        self.counters = output.report.counters;
+        self.outlet.send(|out| *out = output.report)?;
+        if let Some(waker) = &self.waker {
+            waker.wake()?;
+        }
+        Ok(())
+    }
+
+    /// Takes in questions, and shows the planner those stamped before `tick` that it has not
+    /// seen.
+    fn receive(&mut self, seat: &Seat, tick: u64) -> Result<(), RoleError> {
+        while let Some(question) = self.server.receive()? {
+            Checked::new(&*question, seat.counts()).map_err(refused("hard"))?;
+            self.give_up_old(question.robot);
+            self.questions.push(Held {
+                question,
+                seen: false,
+            });
+        }
+        self.requests.clear();
+        for held in &mut self.questions {
+            if !held.seen && held.question.tick < tick {
+                held.seen = true;
+                self.requests.push(*held.question);
+            }
+        }
+        self.requests
+            .sort_unstable_by_key(|request| (request.robot, request.tick));
+        Ok(())
+    }
+
+    /// Lets the oldest question of a robot go that holds as many as its client may.
+    fn give_up_old(&mut self, robot: u32) {
+        let theirs = |held: &Held| held.question.robot == robot;
+        let count = self.questions.iter().filter(|held| theirs(held)).count();
+        if count > OPEN_CALLS
+            && let Some(oldest) = self.questions.iter().position(theirs)
+        {
+            self.questions.remove(oldest);
+        }
+    }
+}
+
+fn is_answer(question: &HardRequest, answer: &HardAnswer) -> bool {
+    let asked = (question.robot, question.incarnation, question.failure);
+    asked == (answer.robot, answer.incarnation, answer.failure)
 }

@@ -1,14 +1,199 @@
-//! The loop around the recorder.
+//! The loop around the trace's writer.
+//!
+//! Responsible for: giving the writer every batch in order and the snapshots as they come, ending
+//! a chunk every second of wall time, telling the world how far it has come.
+//! Not responsible for: what is in a trace (crate `trace`).
+//!
+//! The recorder sleeps between two looks whatever the others do: it takes many batches at once,
+//! and the world waits for it only when it is a whole window behind.
 
-use std::path::Path;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
 
-use crate::roles::RoleError;
+use shm_types::{Checked, EventKind, MotionBatch, Outcome, RecorderReport, WorldSnapshot};
+use trace::{Ending, SceneRecord, WriteError, Writer};
+use world::FIRST_INCARNATION;
+
+use crate::clock;
+use crate::options::Role;
+use crate::ports::{Access, Publisher, Subscriber};
+use crate::report::RecorderSummary;
+use crate::roles::{RoleError, Seat, Telling, refused};
+use crate::wakes::Waker;
+
+/// Sleep between two looks.
+const PERIOD: Duration = Duration::from_micros(500);
+/// Wall time after which a chunk ends, so that a file cut short has all but the last of it, ns.
+const FLUSH_EVERY_NS: u64 = 1_000_000_000;
 
 /// Takes part in the run in `run_dir` until it ends.
 ///
 /// # Errors
-/// Set-up failed, or the run broke off.
+/// Set-up failed, the trace cannot be written, or the run broke off.
 pub fn main(run_dir: &Path) -> Result<(), RoleError> {
-    let _ = run_dir;
-    todo!()
+    let mut seat = Seat::take(run_dir, Role::Recorder)?;
+    let mut shell = Shell::new(&seat)?;
+    seat.settle();
+    shell.tell()?;
+    while shell.ended.is_none() && !seat.is_stopped() {
+        if !shell.look(&mut seat)? {
+            std::thread::sleep(PERIOD);
+        }
+    }
+    let summary = shell.finish(&seat)?;
+    let telling = Telling {
+        lost: summary.lost,
+        recorder: Some(summary),
+        ..Telling::default()
+    };
+    seat.leave(telling)
+}
+
+/// The writer and its ports.
+struct Shell {
+    path: PathBuf,
+    writer: Writer<BufWriter<File>>,
+    flushed_ns: u64,
+    motion: Subscriber<MotionBatch>,
+    snapshots: Subscriber<WorldSnapshot>,
+    outlet: Publisher<RecorderReport>,
+    waker: Option<Waker>,
+    report: RecorderReport,
+    batches: u64,
+    /// How the run ended, and when, ns of virtual time.
+    ended: Option<(Outcome, u64)>,
+}
+
+impl Shell {
+    fn new(seat: &Seat) -> Result<Self, RoleError> {
+        let (topics, node) = (&seat.topics, &seat.node);
+        let options = seat.options();
+        let path = seat.trace_path();
+        let every_ns = if options.state_rate_hz > 0.0 {
+            (1e9 / options.state_rate_hz) as u64
+        } else {
+            u64::MAX
+        };
+        let scene = SceneRecord::new(&seat.scene, &options.settings, seat.run.id_number());
+        let file = File::create(&path).map_err(|error| RoleError::File {
+            path: path.clone(),
+            reason: error.to_string(),
+        })?;
+        let writer = Writer::new(BufWriter::new(file), &scene, every_ns);
+        Ok(Self {
+            writer: writer.map_err(|error| unwritten(&path, &error))?,
+            path,
+            flushed_ns: clock::now_ns(),
+            motion: topics.motion.service(node, Access::Open)?.subscriber()?,
+            snapshots: topics.world.service(node, Access::Open)?.subscriber()?,
+            outlet: topics.recorder.service(node, Access::Open)?.publisher()?,
+            waker: seat.waker(|| topics.wake_world.service(node, Access::Open)?.waker())?,
+            report: RecorderReport {
+                incarnation: FIRST_INCARNATION,
+                ..RecorderReport::default()
+            },
+            batches: 0,
+            ended: None,
+        })
+    }
+
+    /// Writes all that has come; whether anything had.
+    fn look(&mut self, seat: &mut Seat) -> Result<bool, RoleError> {
+        // A snapshot comes after the batch that led to it, so whoever takes it first has both.
+        let snapshot = self.snapshots.receive()?;
+        let before = self.batches;
+        while let Some(batch) = self.motion.receive()? {
+            self.write(&batch)?;
+            seat.dawdle();
+        }
+        if let Some(snapshot) = snapshot {
+            let snapshot = Checked::new(&*snapshot, seat.counts()).map_err(refused("world"))?;
+            self.writer
+                .snapshot(snapshot)
+                .map_err(|error| unwritten(&self.path, &error))?;
+        }
+        if clock::now_ns() >= self.flushed_ns + FLUSH_EVERY_NS {
+            self.flush()?;
+        }
+        let any = self.batches > before;
+        if any {
+            self.tell()?;
+        } else {
+            self.outlet.connect()?;
+        }
+        Ok(any)
+    }
+
+    fn write(&mut self, batch: &MotionBatch) -> Result<(), RoleError> {
+        self.writer
+            .batch(batch)
+            .map_err(|error| unwritten(&self.path, &error))?;
+        self.batches += 1;
+        self.report.next_sequence = batch.sequence + 1;
+        self.report.lost = self.writer.missing_batches();
+        let ended = EventKind::Ended.code();
+        if let Some(end) = batch.events().iter().find(|event| event.kind == ended) {
+            let outcome = u32::try_from(end.value).ok();
+            let outcome = outcome.and_then(|code| Outcome::decode(code).ok());
+            self.ended = Some((outcome.unwrap_or(Outcome::Failed), batch.time_ns));
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<(), RoleError> {
+        self.flushed_ns = clock::now_ns();
+        self.writer
+            .flush()
+            .map_err(|error| unwritten(&self.path, &error))
+    }
+
+    /// Tells the world how far it has come.
+    fn tell(&mut self) -> Result<(), RoleError> {
+        let report = self.report;
+        self.outlet.send(|out| *out = report)?;
+        if let Some(waker) = &self.waker {
+            waker.wake()?;
+        }
+        Ok(())
+    }
+
+    /// Ends the trace; one that breaks off before the run's end stays without an end.
+    fn finish(mut self, seat: &Seat) -> Result<RecorderSummary, RoleError> {
+        let lost = self.report.lost;
+        let summary = RecorderSummary {
+            batches: self.batches,
+            lost,
+            complete: lost == 0 && self.ended.is_some(),
+        };
+        let Some((outcome, makespan_ns)) = self.ended else {
+            self.flush()?;
+            return Ok(summary);
+        };
+        let ending = Ending {
+            outcome: outcome.into(),
+            reason: None,
+            makespan_ns,
+            // Numbers and words have a JSON form; `null` here would only be less to read.
+            options: serde_json::to_value(seat.options()).unwrap_or_default(),
+        };
+        let path = self.path;
+        let file = self
+            .writer
+            .finish(ending)
+            .map_err(|error| unwritten(&path, &error))?;
+        file.into_inner().map_err(|error| RoleError::File {
+            path,
+            reason: error.to_string(),
+        })?;
+        Ok(summary)
+    }
+}
+
+fn unwritten(path: &Path, error: &WriteError) -> RoleError {
+    RoleError::File {
+        path: path.to_owned(),
+        reason: error.to_string(),
+    }
 }

@@ -1,14 +1,115 @@
 //! The loop around one robot.
+//!
+//! Responsible for: bringing a robot its snapshot, its constraint table and its answers, in the
+//! order every driver keeps, and carrying off its command and its questions.
+//! Not responsible for: anything the robot decides (crate `robot`).
+//!
+//! The snapshot is read in place. A question is sent before the command of the same tick, so that
+//! it is there when the planner steps on the next one.
+
+mod questions;
+mod timing;
 
 use std::path::Path;
 
-use crate::roles::RoleError;
+use robot::{Robot, RobotInput};
+use shm_types::{Checked, Command, WorldSnapshot};
+use world::FIRST_INCARNATION;
+
+use crate::options::Role;
+use crate::ports::{Access, Publisher};
+use crate::roles::follower::Follower;
+use crate::roles::tables::Tables;
+use crate::roles::{RoleError, Seat, Telling, refused};
+use crate::wakes::Waker;
+use questions::Questions;
+use timing::Timing;
 
 /// Takes part in the run in `run_dir` as robot `index` until it ends.
 ///
 /// # Errors
 /// Set-up failed, or the run broke off.
 pub fn main(run_dir: &Path, index: u32) -> Result<(), RoleError> {
-    let _ = (run_dir, index);
-    todo!()
+    let mut seat = Seat::take(run_dir, Role::Robot(index))?;
+    let robots = seat.run.robots;
+    if index >= robots {
+        return Err(RoleError::Index { index, robots });
+    }
+    let mut shell = Shell::new(&seat, index)?;
+    let mut follower = Follower::new(&seat, index, robots + 1)?;
+    seat.settle();
+    while let Some(snapshot) = follower.next(&mut seat)? {
+        let snapshot = Checked::new(&*snapshot, seat.counts()).map_err(refused("world"))?;
+        shell.answer(&mut seat, snapshot)?;
+    }
+    let telling = Telling {
+        deadline_misses: follower.deadline_misses(),
+        counters: shell.command.counters.into(),
+        ..Telling::default()
+    };
+    seat.leave(telling)
+}
+
+/// A robot and its ports.
+struct Shell {
+    index: usize,
+    robot: Robot,
+    tables: Tables,
+    questions: Questions,
+    outlet: Publisher<Command>,
+    waker: Option<Waker>,
+    command: Box<Command>,
+    timing: Timing,
+}
+
+impl Shell {
+    fn new(seat: &Seat, index: u32) -> Result<Self, RoleError> {
+        let (topics, node) = (&seat.topics, &seat.node);
+        let index = index as usize;
+        let settings = seat.options().settings.clone();
+        Ok(Self {
+            index,
+            robot: Robot::new(&seat.scene, settings, index, FIRST_INCARNATION),
+            tables: Tables::new(seat)?,
+            questions: Questions::new(topics.hard.service(node, Access::Open)?.client()?),
+            outlet: topics.command.service(node, Access::Open)?.publisher()?,
+            waker: seat.waker(|| topics.wake_world.service(node, Access::Open)?.waker())?,
+            command: Box::default(),
+            timing: Timing::default(),
+        })
+    }
+
+    /// One tick: from a snapshot to a command.
+    fn answer(
+        &mut self,
+        seat: &mut Seat,
+        snapshot: Checked<'_, WorldSnapshot>,
+    ) -> Result<(), RoleError> {
+        let header = &snapshot.header;
+        self.tables.receive()?;
+        self.questions.receive(seat, header.tick)?;
+        self.timing
+            .see(&snapshot.robots()[self.index], &mut seat.latencies);
+        let input = RobotInput {
+            snapshot,
+            table: self.tables.version(header.epoch_constraints_version)?,
+            answer: self.questions.answer(),
+        };
+        let units = seat.options().settings.units_per_tick(header.busy);
+        let started_ns = self.timing.start();
+        let asked = self
+            .robot
+            .step(&seat.scene, input, units, &mut self.command);
+        self.timing.stop(started_ns, &mut seat.latencies);
+        seat.dawdle();
+        if let Some(question) = asked {
+            self.questions.ask(question)?;
+        }
+        self.outlet.send(|out| *out = *self.command)?;
+        self.timing.sent(&self.command);
+        if let Some(waker) = &self.waker {
+            waker.wake()?;
+        }
+        Ok(())
+    }
 }

@@ -1,14 +1,245 @@
-//! The loop around the world.
+//! The loop around the world: it makes the ticks.
+//!
+//! Responsible for: publishing each snapshot, in lockstep waiting for every live participant's
+//! answer to it, in real time keeping the world's own deadlines, and staying until everybody has
+//! seen the end.
+//! Not responsible for: anything the world decides (crate `world`).
+//!
+//! Both snapshots and batches of motion are written in place. A batch is sent before the snapshot
+//! it led to.
+
+mod ears;
+mod hashes;
 
 use std::path::Path;
+use std::time::Duration;
 
-use crate::roles::RoleError;
+use shm_types::capacity::MAX_ROBOTS;
+use shm_types::{Activity, ControlRequest, MotionBatch, Outcome, WorldSnapshot};
+use world::{World, WorldInput};
 
-/// Takes part in the run in `run_dir` until it ends.
+use crate::clock;
+use crate::histograms::Timed;
+use crate::options::Role;
+use crate::ports::{Access, Publisher};
+use crate::report::{ActivityReport, WorldReport};
+use crate::roles::{RoleError, Seat, Telling};
+use crate::ticker::Ticker;
+use crate::wait::Waiter;
+use crate::wakes::Waker;
+use ears::Ears;
+use hashes::HashFile;
+
+/// Identity of the run, as the machine knows it: none, so that its state is the same in every run
+/// of a scenario, whatever drives it. The snapshot's own is stamped on it with the time.
+const NO_RUN: u64 = 0;
+/// How long the world sleeps between two looks once the run is over.
+const LINGER: Duration = Duration::from_millis(1);
+
+/// Takes part in the run in `run_dir` until it ends and the supervisor lets go.
 ///
 /// # Errors
 /// Set-up failed, or the run broke off.
 pub fn main(run_dir: &Path) -> Result<(), RoleError> {
-    let _ = run_dir;
-    todo!()
+    let mut seat = Seat::take(run_dir, Role::World)?;
+    let mut shell = Shell::new(&seat)?;
+    seat.settle();
+    shell.publish()?;
+    if shell.wait_for_all(&seat)? {
+        shell.start_ticker(&seat);
+        shell.run(&mut seat)?;
+    }
+    shell.linger(&seat)?;
+    let telling = Telling {
+        deadline_misses: shell.ticker.map_or(0, |ticker| ticker.misses()),
+        lost: shell.ears.lost_commands(),
+        world: Some(shell.report(&seat)),
+        ..Telling::default()
+    };
+    seat.leave(telling)
+}
+
+/// The world and its ports.
+struct Shell {
+    world: World,
+    run_id: u64,
+    tick: u64,
+    ears: Ears,
+    snapshots: Publisher<WorldSnapshot>,
+    motion: Publisher<MotionBatch>,
+    waiter: Waiter,
+    waker: Option<Waker>,
+    /// The own deadlines, in real time.
+    ticker: Option<Ticker>,
+    hashes: Option<HashFile>,
+    /// What the step of this tick is told.
+    control: Vec<ControlRequest>,
+    published_ns: u64,
+}
+
+impl Shell {
+    fn new(seat: &Seat) -> Result<Self, RoleError> {
+        let (topics, node) = (&seat.topics, &seat.node);
+        let options = seat.options();
+        let sleeper = || topics.wake_world.service(node, Access::Open)?.sleeper();
+        let waker = || {
+            let wakes = &topics.wake_participants;
+            wakes.service(node, Access::Open)?.waker()
+        };
+        Ok(Self {
+            world: World::new(&seat.scene, options.settings.clone(), NO_RUN),
+            run_id: seat.run.id_number(),
+            tick: 0,
+            ears: Ears::new(seat)?,
+            snapshots: topics.world.service(node, Access::Open)?.publisher()?,
+            motion: topics.motion.service(node, Access::Open)?.publisher()?,
+            waiter: seat.waiter(sleeper)?,
+            waker: seat.waker(waker)?,
+            ticker: None,
+            hashes: options
+                .hashes
+                .as_deref()
+                .map(HashFile::create)
+                .transpose()?,
+            control: Vec::with_capacity(ears::MOST_REQUESTS),
+            published_ns: 0,
+        })
+    }
+
+    /// Ticks until the run is over or this process is to end.
+    fn run(&mut self, seat: &mut Seat) -> Result<(), RoleError> {
+        loop {
+            self.step(seat)?;
+            seat.dawdle();
+            self.publish()?;
+            seat.latencies.record(Timed::Tick, self.since_before());
+            if self.world.outcome() != Outcome::Running {
+                return Ok(());
+            }
+            let go_on = match &mut self.ticker {
+                Some(ticker) => {
+                    ticker.wait();
+                    self.ears.listen(&self.world)?;
+                    !seat.is_stopped()
+                }
+                None => self.wait_for_all(seat)?,
+            };
+            if !go_on {
+                return Ok(());
+            }
+        }
+    }
+
+    /// In real time, too, everybody must have answered the first snapshot; then time starts.
+    fn start_ticker(&mut self, seat: &Seat) {
+        if let Some(period_ns) = seat.options().clock.period_ns() {
+            self.ticker = Some(Ticker::new(clock::now_ns() + period_ns, period_ns));
+        }
+    }
+
+    /// Waits until every live participant has answered the present tick, or somebody has asked
+    /// for the end. Lets late joiners in meanwhile. `false` if this process is to end.
+    fn wait_for_all(&mut self, seat: &Seat) -> Result<bool, RoleError> {
+        loop {
+            self.ears.listen(&self.world)?;
+            if self.ears.have_answered(self.tick) || self.ears.stop_is_asked() {
+                self.waiter.arrived();
+                return Ok(true);
+            }
+            if seat.is_stopped() {
+                return Ok(false);
+            }
+            self.connect()?;
+            self.waiter.pause()?;
+        }
+    }
+
+    fn connect(&self) -> Result<(), RoleError> {
+        self.snapshots.connect()?;
+        self.motion.connect()?;
+        Ok(())
+    }
+
+    /// One tick of the machine; its motion is on its way when this returns.
+    fn step(&mut self, seat: &mut Seat) -> Result<(), RoleError> {
+        let started_ns = clock::now_ns();
+        self.ears.take_control(&mut self.control);
+        let mut commands = [None; MAX_ROBOTS];
+        self.ears.commands(&mut commands)?;
+        let input = WorldInput {
+            commands: &commands[..seat.run.robots as usize],
+            planner: self.ears.report()?,
+            table: self.ears.table()?,
+            control: &self.control,
+        };
+        let world = &mut self.world;
+        self.motion
+            .send(|batch| world.step(&seat.scene, input, batch))?;
+        self.tick += 1;
+        seat.record_since(Timed::WorldStep, started_ns);
+        if let Some(hashes) = &mut self.hashes {
+            hashes.add(self.world.state_hash())?;
+        }
+        Ok(())
+    }
+
+    fn publish(&mut self) -> Result<(), RoleError> {
+        let (world, run_id) = (&self.world, self.run_id);
+        self.snapshots.send(|snapshot| {
+            world.snapshot_into(snapshot);
+            snapshot.header.run_id = run_id;
+            snapshot.header.publish_stamp_ns = clock::now_ns();
+        })?;
+        if let Some(waker) = &self.waker {
+            waker.wake()?;
+        }
+        Ok(())
+    }
+
+    /// Time since this was last asked.
+    fn since_before(&mut self) -> u64 {
+        let now_ns = clock::now_ns();
+        now_ns - std::mem::replace(&mut self.published_ns, now_ns)
+    }
+
+    /// Stays, so that everybody can see the end, until the supervisor lets go.
+    fn linger(&mut self, seat: &Seat) -> Result<(), RoleError> {
+        if let Some(hashes) = &mut self.hashes {
+            hashes.flush()?;
+        }
+        while !seat.is_stopped() {
+            self.ears.listen(&self.world)?;
+            self.connect()?;
+            std::thread::sleep(LINGER);
+        }
+        Ok(())
+    }
+
+    fn report(&self, seat: &Seat) -> WorldReport {
+        let world = &self.world;
+        let counters = world.counters();
+        let stuck = world.stuck_reason(&seat.scene).map(|why| why.to_string());
+        let violated = || world.violation().map(|violation| format!("{violation:?}"));
+        let activities = (0..seat.run.robots as usize).map(|robot| {
+            let mut report = ActivityReport::default();
+            for activity in Activity::ALL {
+                *report.of_mut(*activity) = world.times(robot).ticks(*activity);
+            }
+            report
+        });
+        WorldReport {
+            outcome: world.outcome().code(),
+            reason: stuck.or_else(violated),
+            ticks: self.tick,
+            time_ns: self.tick * seat.options().settings.tick_ns,
+            state_hash: world.state_hash(),
+            hard_constraints: self.ears.constraints(),
+            task_failures: counters.task_failures,
+            grants_refused: counters.grants_refused,
+            selection_conflicts: counters.selection_conflicts,
+            violations: counters.violations,
+            swept_tests: counters.swept_tests,
+            activities: activities.collect(),
+        }
+    }
 }

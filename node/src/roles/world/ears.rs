@@ -1,0 +1,199 @@
+//! All that the world hears.
+//!
+//! Responsible for: the newest command of each robot, the planner's newest report and the table
+//! it goes with, how far the recorder has come, requests of control; and whether everybody has
+//! answered a tick.
+//! Not responsible for: what any of it means to the world (crate `world`).
+//!
+//! The recorder takes part by a window: the world runs ahead of it by so many batches, then it
+//! waits. A message that is no legal one counts as lost.
+
+use shm_types::capacity::MAX_ROBOTS;
+use shm_types::{
+    Checked, Command, ConstraintTable, ControlKind, ControlReply, ControlRequest, Counts,
+    PlannerReport, RecorderReport, RoleKind, Validate,
+};
+use world::{FIRST_INCARNATION, World};
+
+use crate::calls::Server;
+use crate::ports::{Access, Subscriber};
+use crate::roles::tables::Tables;
+use crate::roles::{RoleError, Seat, refused};
+use crate::topics::MOTION_WINDOW;
+
+/// Most requests of control taken in one tick; later ones wait for the next.
+pub(super) const MOST_REQUESTS: usize = 16;
+
+/// What is known of one robot's process.
+#[derive(Clone, Default)]
+struct Robot {
+    live: bool,
+    incarnation: u32,
+    /// Whether a command has come at all.
+    heard: bool,
+    command: Command,
+}
+
+/// The world's receiving ports, and the newest of all that came.
+pub(super) struct Ears {
+    counts: Counts,
+    commands: Subscriber<Command>,
+    planner: Subscriber<PlannerReport>,
+    recorder: Subscriber<RecorderReport>,
+    control: Server<ControlRequest, ControlReply>,
+    tables: Tables,
+    robots: Vec<Robot>,
+    report: Option<PlannerReport>,
+    recorded: Option<RecorderReport>,
+    requests: Vec<ControlRequest>,
+    lost_commands: u64,
+}
+
+impl Ears {
+    pub(super) fn new(seat: &Seat) -> Result<Self, RoleError> {
+        let (topics, node) = (&seat.topics, &seat.node);
+        let robot = Robot {
+            live: true,
+            incarnation: FIRST_INCARNATION,
+            ..Robot::default()
+        };
+        Ok(Self {
+            counts: seat.counts(),
+            commands: topics.command.service(node, Access::Open)?.subscriber()?,
+            planner: topics.planner.service(node, Access::Open)?.subscriber()?,
+            recorder: topics.recorder.service(node, Access::Open)?.subscriber()?,
+            control: topics.control.service(node, Access::Open)?.server()?,
+            tables: Tables::new(seat)?,
+            robots: vec![robot; seat.run.robots as usize],
+            report: None,
+            recorded: None,
+            requests: Vec::with_capacity(MOST_REQUESTS),
+            lost_commands: 0,
+        })
+    }
+
+    /// Takes in all that has come.
+    pub(super) fn listen(&mut self, world: &World) -> Result<(), RoleError> {
+        while let Some(command) = self.commands.receive()? {
+            self.hear(&command);
+        }
+        if let Some(report) = self.planner.receive()? {
+            Checked::new(&*report, self.counts).map_err(refused("planner"))?;
+            self.report = Some(*report);
+        }
+        self.tables.receive()?;
+        if let Some(report) = self.recorder.receive()? {
+            Checked::new(&*report, self.counts).map_err(refused("recorder"))?;
+            self.recorded = Some(*report);
+        }
+        while self.requests.len() < MOST_REQUESTS
+            && let Some(request) = self.control.receive()?
+        {
+            self.obey(&request, world);
+            request.answer(world.reply_to(&request))?;
+        }
+        Ok(())
+    }
+
+    fn hear(&mut self, command: &Command) {
+        if command.validate(self.counts).is_err() {
+            self.lost_commands += 1;
+            return;
+        }
+        let robot = &mut self.robots[command.robot as usize];
+        let newer = command.sequence > robot.command.sequence;
+        if command.incarnation != robot.incarnation || (robot.heard && !newer) {
+            return;
+        }
+        if robot.heard {
+            self.lost_commands += command.sequence - robot.command.sequence - 1;
+        }
+        robot.heard = true;
+        robot.command = *command;
+    }
+
+    /// Notes what the next step is told, and who takes part from then on.
+    fn obey(&mut self, request: &ControlRequest, world: &World) {
+        let accepted =
+            request.validate(self.counts).is_ok() && world.reply_to(request).accepted == 1;
+        if !accepted {
+            return;
+        }
+        self.requests.push(*request);
+        if request.role != RoleKind::Robot.code() {
+            return;
+        }
+        let robot = &mut self.robots[request.index as usize];
+        if request.kind == ControlKind::Down.code() {
+            robot.live = false;
+        } else if request.kind == ControlKind::Up.code() {
+            robot.live = true;
+            robot.incarnation = request.incarnation;
+            robot.heard = false;
+        }
+    }
+
+    /// Whether every live participant has answered `tick`.
+    pub(super) fn have_answered(&self, tick: u64) -> bool {
+        let robots = self
+            .robots
+            .iter()
+            .all(|robot| !robot.live || (robot.heard && robot.command.tick >= tick));
+        let planner = self.report.is_some_and(|report| report.tick >= tick);
+        let recorder = self
+            .recorded
+            .is_some_and(|report| tick < report.next_sequence.saturating_add(MOTION_WINDOW));
+        // Nobody has answered the first tick before it has said so.
+        robots && planner && recorder
+    }
+
+    /// Whether somebody has asked for the end.
+    pub(super) fn stop_is_asked(&self) -> bool {
+        let stop = ControlKind::Stop.code();
+        self.requests.iter().any(|request| request.kind == stop)
+    }
+
+    /// Hands over the requests of control that the next step is told.
+    pub(super) fn take_control(&mut self, requests: &mut Vec<ControlRequest>) {
+        requests.clear();
+        requests.append(&mut self.requests);
+    }
+
+    /// The newest command of each robot.
+    pub(super) fn commands<'a>(
+        &'a self,
+        commands: &mut [Option<Checked<'a, Command>>; MAX_ROBOTS],
+    ) -> Result<(), RoleError> {
+        for (place, robot) in commands.iter_mut().zip(&self.robots) {
+            if robot.heard {
+                let command = Checked::new(&robot.command, self.counts);
+                *place = Some(command.map_err(refused("command"))?);
+            }
+        }
+        Ok(())
+    }
+
+    /// The planner's newest report.
+    pub(super) fn report(&self) -> Result<Option<Checked<'_, PlannerReport>>, RoleError> {
+        let report = self.report.as_ref();
+        report
+            .map(|report| Checked::new(report, self.counts).map_err(refused("planner")))
+            .transpose()
+    }
+
+    /// The newest constraint table.
+    pub(super) fn table(&self) -> Result<Option<Checked<'_, ConstraintTable>>, RoleError> {
+        self.tables.newest()
+    }
+
+    /// How many hard constraints it holds.
+    pub(super) fn constraints(&self) -> u64 {
+        let table = self.tables.newest().ok().flatten();
+        table.map_or(0, |table| u64::from(table.count))
+    }
+
+    /// Commands that never came, or were no legal ones.
+    pub(super) const fn lost_commands(&self) -> u64 {
+        self.lost_commands
+    }
+}

@@ -1,0 +1,157 @@
+//! The end of a run: letting the processes go, and gathering what they leave.
+//!
+//! Responsible for: the order in which processes leave, killing those that do not, one report.
+//! Not responsible for: deciding that the run is over (`supervisor`).
+
+use std::fs::File;
+use std::os::fd::AsRawFd;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use shm_types::Outcome;
+
+use crate::histograms::Latencies;
+use crate::options::Role;
+use crate::report::{RoleReport, RunReport, WorkReport, WorldReport};
+use crate::roles::TRACE_FILE;
+use crate::supervisor::{End, PERIOD, Run};
+
+/// How long participants may take to leave by themselves. The recorder has a file to finish.
+const LEAVE_GRACE: Duration = Duration::from_secs(10);
+/// How long they may take to leave when asked.
+const TERMINATE_GRACE: Duration = Duration::from_secs(2);
+
+impl Run<'_> {
+    /// Lets everybody go, and gathers what they leave. Nothing of the run is left when this
+    /// returns, but the trace if it was to be kept.
+    pub(super) fn wind_up(mut self, end: End) -> RunReport {
+        let wall_s = self.started.elapsed().as_secs_f64();
+        let (outcome, reason) = match end {
+            End::Outcome(outcome) => {
+                self.await_others();
+                (outcome, None)
+            }
+            End::Interrupted => (Outcome::Interrupted, None),
+            End::Lost(words) => (Outcome::Failed, Some(words)),
+        };
+        self.end_all();
+        let roles = self.reports();
+        let world = self.world_report(&roles);
+        let mut counters = WorkReport::default();
+        let mut latency = Latencies::new();
+        for role in &roles {
+            counters.add(&role.counters);
+            if let Ok(own) = Latencies::read(&Latencies::path(self.directory.path(), role.role)) {
+                latency.merge(&own);
+            }
+        }
+        let mut notes = std::mem::take(&mut self.notes);
+        notes.extend(roles.iter().flat_map(|role| role.notes.iter().cloned()));
+        let lost_commands = roles.iter().find(|role| role.role == Role::World);
+        let (trace, kept) = self.keep_trace();
+        RunReport {
+            run_id: self.file.id_number(),
+            name: self.file.name.clone(),
+            outcome,
+            reason: reason.or_else(|| world.reason.clone()),
+            counters,
+            latency,
+            deadline_misses: roles.iter().map(|role| role.deadline_misses).sum(),
+            lost_commands: lost_commands.map_or(0, |world| world.lost),
+            restarts: self.restarts,
+            wall_s,
+            oversubscribed: self.oversubscribed,
+            trace,
+            notes,
+            world,
+            roles,
+            _trace: kept,
+        }
+    }
+
+    /// Everybody but the world leaves by itself once it has seen the end.
+    fn await_others(&mut self) {
+        let by = Instant::now() + LEAVE_GRACE;
+        while Instant::now() < by {
+            let mut others = self
+                .participants
+                .iter_mut()
+                .filter(|one| one.role != Role::World);
+            if others.all(|one| one.ended().is_some()) {
+                return;
+            }
+            // Not in their own time, if somebody is in a hurry.
+            if self.signals.take() {
+                return;
+            }
+            std::thread::sleep(PERIOD);
+        }
+    }
+
+    /// Asks those that are left to leave, then kills them.
+    fn end_all(&mut self) {
+        for one in &mut self.participants {
+            one.terminate();
+        }
+        let by = Instant::now() + TERMINATE_GRACE;
+        while Instant::now() < by
+            && !self
+                .participants
+                .iter_mut()
+                .all(|one| one.ended().is_some())
+        {
+            std::thread::sleep(PERIOD);
+        }
+        for one in &mut self.participants {
+            let killed = one.ended().is_none();
+            one.kill();
+            if killed {
+                self.notes
+                    .push(format!("{} did not leave and was killed", one.role));
+            } else if one.ended().is_some_and(|status| !status.success()) {
+                self.notes.push(one.last_words());
+            }
+        }
+    }
+
+    /// What each process has left; what is known of one that has left nothing.
+    fn reports(&self) -> Vec<RoleReport> {
+        let processes = self.file.processes.iter();
+        processes
+            .map(|process| {
+                RoleReport::read(self.directory.path(), process.role)
+                    .unwrap_or_else(|_| RoleReport::missing(process.role, process.pid))
+            })
+            .collect()
+    }
+
+    fn world_report(&self, roles: &[RoleReport]) -> WorldReport {
+        let told = roles.iter().find_map(|role| role.world.clone());
+        told.or_else(|| {
+            let header = self.watch.header()?;
+            Some(WorldReport {
+                outcome: header.outcome,
+                ticks: header.tick,
+                time_ns: header.time_ns,
+                state_hash: header.state_hash,
+                ..WorldReport::default()
+            })
+        })
+        .unwrap_or_default()
+    }
+
+    /// Where the trace can be read: where it was asked for, or through a descriptor, so that it
+    /// outlives the run's directory and is gone with the report.
+    fn keep_trace(&self) -> (Option<PathBuf>, Option<File>) {
+        if let Some(path) = &self.plan.options.trace {
+            return (path.exists().then(|| path.clone()), None);
+        }
+        match File::open(self.directory.path().join(TRACE_FILE)) {
+            Ok(file) => {
+                let path = PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()));
+                (Some(path), Some(file))
+            }
+            Err(_) => (None, None),
+        }
+    }
+}
