@@ -134,7 +134,7 @@ pub struct SnapshotHeader {
     /// Raised whenever any body moved or any event happened: a robot that has looked since then
     /// and found nothing to do is settled (rule 22).
     pub change: u64,
-    /// Raised at each grasp, release and new constraint version: what lifts bars (rule 21).
+    /// Raised at each grasp, release and new constraint: what lifts bars (rule 21).
     pub placements: u64,
     /// Version of the hard-constraint table in force; 0 is the empty table.
     pub constraints_version: u32,

@@ -4,7 +4,7 @@
 //! Responsible for: what a failure bars, and what lifts it. Not responsible for: telling robots
 //! and objects apart as the cause (crate `robot`).
 //!
-//! A failure caused by objects bars until the next grasp, release or constraint version. Of those
+//! A failure caused by objects bars until the next grasp, release or new constraint. Of those
 //! caused by robots, the first B − 1 of one robot and task between such events bar nothing; the
 //! B-th bars until its blocker is parked elsewhere; any further one until such an event.
 

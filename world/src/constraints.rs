@@ -46,6 +46,12 @@ impl Constraints {
         hash.add(&(self.next as u64));
     }
 
+    /// Whether the table in force holds a constraint that the one before it did not.
+    fn say_anything_new(&self) -> bool {
+        let mut found = self.in_force.constraints().iter();
+        found.any(|c| self.before.constraints().binary_search(c).is_err())
+    }
+
     fn is_told(&self) -> bool {
         self.next >= self.in_force.count as usize
     }
@@ -70,7 +76,11 @@ impl World {
             constraints.in_force.copy_from(table);
             constraints.next = 0;
             self.epoch.due = true;
-            self.placed();
+            // A version that says nothing new lifts no bar: failures each followed by one would
+            // otherwise go on for ever (rule 21).
+            if constraints.say_anything_new() {
+                self.placed();
+            }
         }
         self.constraints.tell(journal);
     }
@@ -79,7 +89,7 @@ impl World {
 #[cfg(test)]
 mod tests {
     use shm_types::capacity::MAX_CONSTRAINTS;
-    use shm_types::{Constraint, ConstraintKind, ConstraintTable, EventKind};
+    use shm_types::{Constraint, ConstraintKind, ConstraintTable, EventKind, FailureCause, NONE};
 
     use crate::testing::{BELOW, Bench, room};
 
@@ -120,6 +130,25 @@ mod tests {
         assert_eq!((told[0].task, told[0].other), (2, 1));
         assert_eq!(told[0].value, u64::from(ConstraintKind::H1.code()));
         assert_eq!(bench.header().epoch, 3);
+    }
+
+    #[test]
+    fn a_version_that_says_nothing_new_opens_an_epoch_but_lifts_no_bar() {
+        let mut bench = bench();
+        bench.table = Some(table(1, 0, &[(0, 1), (0, 2)]));
+        bench.step();
+        bench.fail(0, 1, FailureCause::Objects, NONE);
+        bench.step();
+        let (epoch, placements) = (bench.header().epoch, bench.header().placements);
+        bench.table = Some(table(2, 0, &[(0, 1)]));
+        bench.step();
+        assert_eq!(bench.header().epoch, epoch + 1);
+        assert_eq!(bench.header().placements, placements);
+        assert_eq!(bench.object(1).barred[0], 1);
+        bench.table = Some(table(3, 0, &[(0, 1), (2, 1)]));
+        bench.step();
+        assert_eq!(bench.header().placements, placements + 1);
+        assert_eq!(bench.object(1).barred[0], 0);
     }
 
     #[test]

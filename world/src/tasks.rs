@@ -40,7 +40,7 @@ impl World {
         self.placed();
     }
 
-    /// A grasp, a release or a new constraint version: lifts all bars (rule 21).
+    /// A grasp, a release or a new constraint: lifts all bars (rule 21).
     pub(crate) fn placed(&mut self) {
         self.epoch.placements += 1;
         self.lift_all_bars();
