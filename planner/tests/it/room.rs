@@ -7,10 +7,15 @@ use shm_types::{
 };
 
 /// Start and goal of an object's centre, m.
-pub type Trip = ([f64; 2], Option<[f64; 2]>);
+pub(crate) type Trip = ([f64; 2], Option<[f64; 2]>);
 
 /// A draft with the paper's robots and objects, `x0, y0, x1, y1` in metres.
-pub fn draft(bounds: [f64; 4], walls: &[[f64; 4]], homes: &[[f64; 2]], trips: &[Trip]) -> Draft {
+pub(crate) fn draft(
+    bounds: [f64; 4],
+    walls: &[[f64; 4]],
+    homes: &[[f64; 2]],
+    trips: &[Trip],
+) -> Draft {
     let mut draft = Draft::room("test", bounds);
     draft.walls = walls.iter().map(|wall| WallDraft::Box(*wall)).collect();
     draft.homes = homes.to_vec();
@@ -22,24 +27,29 @@ pub fn draft(bounds: [f64; 4], walls: &[[f64; 4]], homes: &[[f64; 2]], trips: &[
 }
 
 /// The scene of a draft that is expected to be sound.
-pub fn scene_of(draft: Draft) -> Scene {
+pub(crate) fn scene_of(draft: Draft) -> Scene {
     Scene::new(draft).unwrap_or_else(|problems| panic!("{problems:?}"))
 }
 
 /// A room with the paper's robots and objects.
-pub fn room(bounds: [f64; 4], walls: &[[f64; 4]], homes: &[[f64; 2]], trips: &[Trip]) -> Scene {
+pub(crate) fn room(
+    bounds: [f64; 4],
+    walls: &[[f64; 4]],
+    homes: &[[f64; 2]],
+    trips: &[Trip],
+) -> Scene {
     scene_of(draft(bounds, walls, homes, trips))
 }
 
 /// A scenario that is shipped.
-pub fn shipped(name: &str) -> Scene {
+pub(crate) fn shipped(name: &str) -> Scene {
     let path = format!("{}/../scenarios/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
     scene::parse(&text, &path).unwrap_or_else(|error| panic!("{}", error.plain()))
 }
 
 /// The world at the start of a run.
-pub fn start(scene: &Scene) -> Box<WorldSnapshot> {
+pub(crate) fn start(scene: &Scene) -> Box<WorldSnapshot> {
     let mut world = zeroed::<WorldSnapshot>();
     world.header = SnapshotHeader {
         epoch: 1,
@@ -69,7 +79,7 @@ pub fn start(scene: &Scene) -> Box<WorldSnapshot> {
 }
 
 /// Puts an object down; its task is done if that is its goal, or if it has none.
-pub fn put(object: &mut ObjectState, at: Point) {
+pub(crate) fn put(object: &mut ObjectState, at: Point) {
     object.position = at;
     object.rest = at;
     let left = (vec(object.goal) - vec(at)).amax();
@@ -84,12 +94,12 @@ pub fn put(object: &mut ObjectState, at: Point) {
 }
 
 /// A snapshot as the planner accepts it.
-pub fn checked<'a>(scene: &Scene, world: &'a WorldSnapshot) -> Checked<'a, WorldSnapshot> {
+pub(crate) fn checked<'a>(scene: &Scene, world: &'a WorldSnapshot) -> Checked<'a, WorldSnapshot> {
     Checked::new(world, scene.counts()).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// The table of no constraint.
-pub fn no_constraints() -> Box<ConstraintTable> {
+pub(crate) fn no_constraints() -> Box<ConstraintTable> {
     let mut table = zeroed::<ConstraintTable>();
     table.complete_for_events = u64::MAX;
     table

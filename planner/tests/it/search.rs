@@ -12,7 +12,7 @@ use shm_types::Counters;
 use crate::room::{draft, room, scene_of};
 
 /// Runs a search to its end in slices of `units`; also the slices it took.
-pub fn run(
+pub(crate) fn run(
     search: &mut PathSearch,
     scene: &Scene,
     from: Vec2,
@@ -52,7 +52,7 @@ fn joints(scene: &Scene, space: &Occupancy, at: Vec2) -> Vec<(u32, f64)> {
 }
 
 /// Length of the shortest path by definition, m.
-pub fn reference(scene: &Scene, space: &Occupancy, from: Vec2, to: Vec2) -> Option<f64> {
+pub(crate) fn reference(scene: &Scene, space: &Occupancy, from: Vec2, to: Vec2) -> Option<f64> {
     let mut least = vec![f64::INFINITY; scene.lattice.len()];
     let mut open = BinaryHeap::new();
     for (cell, length) in joints(scene, space, from) {
