@@ -207,6 +207,11 @@ impl Occupancy {
     /// against the walls and all that was blocked.
     #[must_use]
     pub fn straight_is_free(&self, scene: &Scene, from: Vec2, to: Vec2) -> bool {
+        let (low, high) = scene.bounds;
+        let within = |p: Vec2| low.x <= p.x && low.y <= p.y && p.x <= high.x && p.y <= high.y;
+        if !within(from) || !within(to) {
+            return false;
+        }
         let meets = |shape: &Shape, at: Vec2, at_to: Vec2, clearance: bool| {
             scene.body(self.class).parts.iter().any(|part| {
                 let moving =

@@ -20,11 +20,11 @@ pub const DEFAULT_RESOLUTION_M: f64 = 0.1;
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ShapeDraft {
     /// Full widths along x and y, m.
-    Box([f64; 2]),
+    Box(#[serde(deserialize_with = "crate::file::numbers")] [f64; 2]),
     /// Radius, m.
     Circle(f64),
     /// Corners of a convex polygon around its centre [0, 0], m.
-    Polygon(Vec<[f64; 2]>),
+    Polygon(#[serde(deserialize_with = "crate::file::lists")] Vec<[f64; 2]>),
 }
 
 /// A wall, in world coordinates.
@@ -32,9 +32,9 @@ pub enum ShapeDraft {
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum WallDraft {
     /// Lower left and upper right corner: x0, y0, x1, y1, m.
-    Box([f64; 4]),
+    Box(#[serde(deserialize_with = "crate::file::numbers")] [f64; 4]),
     /// Corners of a convex polygon, m.
-    Polygon(Vec<[f64; 2]>),
+    Polygon(#[serde(deserialize_with = "crate::file::lists")] Vec<[f64; 2]>),
 }
 
 /// The robots' common properties.

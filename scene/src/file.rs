@@ -4,7 +4,8 @@
 //! Not responsible for: what the numbers mean together (`validate`), reporting (`scenario`).
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
 use toml::Spanned;
 
 use crate::draft::{
@@ -79,7 +80,7 @@ struct ObjectDefaults {
     /// Robot centre minus object centre while grasped; by default the robot is centred against
     /// the object's −y side.
     #[schemars(with = "Option<[f64; 2]>")]
-    grasp: Option<Spanned<[f64; 2]>>,
+    grasp: Option<Spanned<Numbers<2>>>,
     /// Whether robots that carry nothing may pass under the object while it is on the ground.
     pass_under: Option<bool>,
 }
@@ -89,7 +90,7 @@ struct ObjectDefaults {
 struct WorkspaceTable {
     /// Lower left and upper right corner: x0, y0, x1, y1.
     #[schemars(with = "[f64; 4]")]
-    bounds: Spanned<[f64; 4]>,
+    bounds: Spanned<Numbers<4>>,
     /// Walls inside the bounds, in world coordinates.
     #[serde(default)]
     #[schemars(with = "Vec<WallDraft>")]
@@ -101,7 +102,7 @@ struct WorkspaceTable {
 struct HomeTable {
     /// Where the robot's centre is at the start, and where it returns to.
     #[schemars(with = "[f64; 2]")]
-    home: Spanned<[f64; 2]>,
+    home: Spanned<Numbers<2>>,
 }
 
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -109,16 +110,16 @@ struct HomeTable {
 struct ObjectTable {
     /// Where the object's centre is at the start.
     #[schemars(with = "[f64; 2]")]
-    start: Spanned<[f64; 2]>,
+    start: Spanned<Numbers<2>>,
     /// Where its centre shall be; without one it is clutter that may be moved.
     #[schemars(with = "Option<[f64; 2]>")]
-    goal: Option<Spanned<[f64; 2]>>,
+    goal: Option<Spanned<Numbers<2>>>,
     /// Shape around its centre, if not that of `[object]`.
     #[schemars(with = "Option<ShapeDraft>")]
     shape: Option<Spanned<ShapeDraft>>,
     /// Robot centre minus object centre while grasped, if not that of `[object]`.
     #[schemars(with = "Option<[f64; 2]>")]
-    grasp: Option<Spanned<[f64; 2]>>,
+    grasp: Option<Spanned<Numbers<2>>>,
     /// Whether robots may pass under it, if not as `[object]` says.
     pass_under: Option<bool>,
 }
@@ -141,9 +142,41 @@ struct MoveTable {
     #[schemars(with = "usize")]
     object: Spanned<usize>,
     /// Where its centre is before.
+    #[serde(deserialize_with = "numbers")]
     from: [f64; 2],
     /// Where its centre is afterwards.
+    #[serde(deserialize_with = "numbers")]
     to: [f64; 2],
+}
+
+/// So many numbers: an array in the file may be neither shorter nor longer.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Numbers<const N: usize>(pub(crate) [f64; N]);
+
+impl<'de, const N: usize> Deserialize<'de> for Numbers<N> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let numbers = Vec::<f64>::deserialize(deserializer)?;
+        let given = numbers.len();
+        numbers.try_into().map(Self).map_err(|_| {
+            let verb = if given == 1 { "is" } else { "are" };
+            D::Error::custom(format!("takes {N} numbers, but {given} {verb} given"))
+        })
+    }
+}
+
+/// [`Numbers`] as a plain array.
+pub(crate) fn numbers<'de, D: Deserializer<'de>, const N: usize>(
+    deserializer: D,
+) -> Result<[f64; N], D::Error> {
+    Numbers::deserialize(deserializer).map(|numbers| numbers.0)
+}
+
+/// A list of [`Numbers`] as plain arrays.
+pub(crate) fn lists<'de, D: Deserializer<'de>, const N: usize>(
+    deserializer: D,
+) -> Result<Vec<[f64; N]>, D::Error> {
+    let lists = Vec::<Numbers<N>>::deserialize(deserializer)?;
+    Ok(lists.into_iter().map(|numbers| numbers.0).collect())
 }
 
 /// A range of bytes of the text.
@@ -212,7 +245,7 @@ impl ScenarioFile {
             name: self.name.get_ref().clone(),
             resolution_m: value(self.resolution.as_ref(), DEFAULT_RESOLUTION_M),
             connectivity,
-            bounds: *self.workspace.bounds.get_ref(),
+            bounds: self.workspace.bounds.get_ref().0,
             walls: self
                 .workspace
                 .walls
@@ -220,7 +253,7 @@ impl ScenarioFile {
                 .map(|wall| wall.get_ref().clone())
                 .collect(),
             robot,
-            homes: self.robots.iter().map(|r| *r.home.get_ref()).collect(),
+            homes: self.robots.iter().map(|r| r.home.get_ref().0).collect(),
             objects,
             before,
             certificate: self
@@ -278,13 +311,13 @@ impl ObjectTable {
             .grasp
             .as_ref()
             .or(defaults.grasp.as_ref())
-            .map(|grasp| *grasp.get_ref());
+            .map(|grasp| grasp.get_ref().0);
         Some(ObjectDraft {
             grasp: grasp.unwrap_or_else(|| default_grasp(&robot.shape, &shape)),
             shape,
             pass_under: self.pass_under.or(defaults.pass_under).unwrap_or(false),
-            start: *self.start.get_ref(),
-            goal: self.goal.as_ref().map(|goal| *goal.get_ref()),
+            start: self.start.get_ref().0,
+            goal: self.goal.as_ref().map(|goal| goal.get_ref().0),
         })
     }
 

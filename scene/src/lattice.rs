@@ -79,7 +79,7 @@ pub(crate) struct LatticeInput<'a> {
     pub(crate) bounds: (Vec2, Vec2),
     pub(crate) resolution_m: f64,
     pub(crate) connectivity: Connectivity,
-    /// Walls, the four around the bounds included.
+    /// Walls inside the bounds.
     pub(crate) walls: &'a [(Shape, Vec2)],
     /// All classes of bodies.
     pub(crate) classes: &'a [Body],
@@ -127,7 +127,16 @@ impl Lattice {
         let walls = rects(input.walls)?;
         let objects = rects(input.objects)?;
         let robots = rects(input.robots)?;
-        let still: Vec<Rect> = walls.into_iter().chain(objects).chain(robots).collect();
+        let bounds = Rect {
+            at: (input.bounds.0 + input.bounds.1) / 2.0,
+            half: (input.bounds.1 - input.bounds.0) / 2.0,
+        };
+        let still: Vec<Rect> = walls
+            .into_iter()
+            .chain(objects)
+            .chain(robots)
+            .chain([bounds])
+            .collect();
         let x = Axis::of(input, &still, |v| v.x)?;
         let y = Axis::of(input, &still, |v| v.y)?;
         let narrowest = input

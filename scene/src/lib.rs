@@ -43,7 +43,7 @@ pub use geometry::{CONTACT_M, Vec2, overlap, point, swept_overlap, swept_regions
 pub use lattice::{Connectivity, Lattice};
 pub use moves::{CertificateError, MovePart, check_certificate};
 pub use problem::{Key, Problem, Problems};
-pub use reach::{CycleKind, Flood, Infeasible, certificate};
+pub use reach::{CycleKind, Flood, Infeasible, certificate, joints};
 pub use scenario::{Located, ScenarioError, parse};
 pub use scene::{ObjectSpec, RobotSpec, Scene};
 pub use schema::json_schema;

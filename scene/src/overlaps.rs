@@ -139,24 +139,32 @@ fn in_wall(
     what: &str,
     found: &mut Vec<Problem>,
 ) {
-    for (i, (wall, at)) in sound.walls.iter().enumerate() {
-        if !meet(shape, body.at, wall, *at) {
-            continue;
-        }
-        let inside = i < draft.walls.len();
-        let mut problem = if inside {
-            Problem::new(body.key, format!("{what} in wall {i}")).also(Key::Wall(i))
+    let fits = |shape: &Shape| {
+        let (low, high) = shape.extent();
+        let below = sound.bounds.0 - (body.at + low);
+        let above = body.at + high - sound.bounds.1;
+        below.max() <= CONTACT_M && above.max() <= CONTACT_M
+    };
+    let without_clearance = |problem: Problem, fits: bool| {
+        if fits {
+            problem.help("without the clearance it would fit")
         } else {
-            let message = format!("{what} partly or wholly outside the bounds");
-            Problem::new(body.key, message).also(Key::Workspace("bounds"))
-        };
-        if !meet(body.shape, body.at, wall, *at) {
-            problem = problem.help("without the clearance it would fit");
+            problem
         }
-        found.push(problem);
-        if !inside {
-            // One side of the bounds says it all.
-            break;
+    };
+    if !fits(shape) {
+        let problem = Problem::new(
+            body.key,
+            format!("{what} partly or wholly outside the bounds"),
+        );
+        let problem = problem.also(Key::Workspace("bounds"));
+        found.push(without_clearance(problem, fits(body.shape)));
+    }
+    for (i, (wall, at)) in sound.walls[..draft.walls.len()].iter().enumerate() {
+        if meet(shape, body.at, wall, *at) {
+            let problem = Problem::new(body.key, format!("{what} in wall {i}")).also(Key::Wall(i));
+            let bare_fits = !meet(body.shape, body.at, wall, *at);
+            found.push(without_clearance(problem, bare_fits));
         }
     }
 }

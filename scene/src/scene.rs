@@ -92,7 +92,8 @@ impl Scene {
             homes,
             classes,
         } = validate(&draft)?;
-        let lattice = choose_lattice(&draft, bounds, &walls, &robot, &objects, &homes, &classes);
+        let inside = &walls[..draft.walls.len()];
+        let lattice = choose_lattice(&draft, bounds, inside, &robot, &objects, &homes, &classes);
         let walls_only = classes
             .iter()
             .map(|body| Raster::of_walls(&lattice, body, &walls))

@@ -133,3 +133,104 @@ proptest! {
         prop_assert!(used.at_is_free(&scene, scene.homes[0]));
     }
 }
+
+fn room(bounds: [f64; 4]) -> Draft {
+    let mut draft = Draft::room("room", bounds);
+    draft.homes = vec![[bounds[0] + 0.5, bounds[1] + 0.5]];
+    draft
+}
+
+#[test]
+fn the_papers_lengths_make_a_lattice_of_a_twentieth() {
+    let mut draft = room([0.0, 0.0, 5.0, 3.4]);
+    draft.objects = vec![ObjectDraft::paper([1.0, 1.0], Some([4.0, 1.0]))];
+    let scene = Scene::new(draft).unwrap();
+    let lattice = &scene.lattice;
+    assert!(lattice.exact);
+    assert!((lattice.pitch_m - 0.05).abs() < 1e-12);
+    assert_eq!((lattice.width, lattice.height), (101, 69));
+    // Grasps and homes are on it, as the very numbers of the file.
+    for p in [scene.homes[0], scene.grasp_at(0, scene.objects[0].start)] {
+        assert_eq!(lattice.at(lattice.cell(p).unwrap()), p);
+    }
+}
+
+#[test]
+fn whole_pitches_are_as_large_as_the_room_allows_but_no_wider_than_a_body() {
+    // Only a robot of half a metre, everything a multiple of a quarter: contacts are too.
+    let draft = room([0.0, 0.0, 4.0, 3.0]);
+    assert_eq!(Scene::new(draft).unwrap().lattice.pitch_m, 0.25);
+    // A robot a metre wide against walls a whole number of metres apart, at its width's half.
+    let mut draft = room([0.0, 0.0, 6.0, 3.0]);
+    draft.robot.shape = ShapeDraft::Box([1.0, 1.0]);
+    assert_eq!(Scene::new(draft).unwrap().lattice.pitch_m, 1.0);
+    // Far apart, yet never coarser than the body.
+    let mut draft = room([0.0, 0.0, 9.5, 6.5]);
+    draft.robot.shape = ShapeDraft::Box([0.5, 0.5]);
+    draft.homes = vec![[0.25, 0.25]];
+    assert_eq!(Scene::new(draft).unwrap().lattice.pitch_m, 0.5);
+}
+
+#[test]
+fn where_lengths_share_no_measure_the_given_resolution_holds() {
+    type Change = fn(&mut Draft);
+    let changes: [Change; 4] = [
+        |draft| draft.robot.shape = ShapeDraft::Circle(0.25),
+        |draft| draft.walls = vec![WallDraft::Polygon(vec![[2.0, 2.0], [3.0, 2.0], [2.0, 3.0]])],
+        |draft| draft.homes = vec![[1.0 / 3.0, 1.0]],
+        |draft| draft.homes = vec![[0.503, 1.0]],
+    ];
+    for change in changes {
+        let mut draft = room([0.0, 0.0, 4.0, 3.0]);
+        change(&mut draft);
+        let scene = Scene::new(draft).unwrap();
+        let lattice = &scene.lattice;
+        assert!(!lattice.exact);
+        assert_eq!(
+            (lattice.pitch_m, lattice.width, lattice.height),
+            (0.1, 40, 30)
+        );
+        assert!((lattice.at(0) - Vec2::new(0.05, 0.05)).amax() < 1e-12);
+        // What lies off it is joined to it exactly.
+        let space = Occupancy::new(&scene);
+        let joints: Vec<_> = scene::joints(&scene, &space, scene.homes[0]).collect();
+        assert!(joints.len() > 3, "{joints:?}");
+        let to_all = |cell: &u32| {
+            let at = lattice.at(*cell);
+            space.straight_is_free(&scene, scene.homes[0], at)
+                && (at - scene.homes[0]).amax() < 0.2 + 1e-12
+        };
+        assert!(joints.iter().all(to_all));
+    }
+}
+
+#[test]
+fn a_passage_between_the_centres_of_cells_is_found() {
+    // A slot as wide as the robot, its middle off every multiple of a tenth (rule 33).
+    let mut draft = room([0.0, 0.0, 4.0, 3.0]);
+    draft.walls = vec![
+        WallDraft::Box([2.0, 0.0, 2.2, 1.15]),
+        WallDraft::Box([2.0, 1.65, 2.2, 3.0]),
+    ];
+    draft.homes.push([3.5, 2.5]);
+    let scene = Scene::new(draft).unwrap();
+    let space = Occupancy::new(&scene);
+    let mut flood = scene::Flood::new(&scene);
+    flood.run(&scene, &space, scene.homes[0]);
+    assert!(flood.reached_at(&scene, &space, scene.homes[1]));
+}
+
+#[test]
+fn a_thin_wall_between_free_points_is_seen() {
+    // The robot's contacts are a quarter apart; the wall is a millimetre thin and cuts a corner.
+    let mut draft = room([0.0, 0.0, 4.0, 3.0]);
+    draft.robot.shape = ShapeDraft::Circle(0.05);
+    draft.resolution_m = 0.1;
+    draft.walls = vec![WallDraft::Box([1.999, -1.0, 2.001, 4.0])];
+    draft.homes.push([3.5, 2.5]);
+    let scene = Scene::new(draft).unwrap();
+    let space = Occupancy::new(&scene);
+    let mut flood = scene::Flood::new(&scene);
+    flood.run(&scene, &space, scene.homes[0]);
+    assert!(!flood.reached_at(&scene, &space, scene.homes[1]));
+}
