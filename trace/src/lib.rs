@@ -15,6 +15,7 @@ mod fit;
 mod merge;
 mod reader;
 pub mod record;
+mod replay;
 mod scene_record;
 mod wire;
 mod writer;
@@ -23,4 +24,5 @@ pub use check::{CheckError, CheckReport, Kind, Violation, Who, check, check_file
 pub use fit::Unfit;
 pub use reader::{Close, ReadError, Reader, Span};
 pub use record::SceneRecord;
+pub use replay::{Frame, Replay};
 pub use writer::{Ending, WriteError, Writer};

@@ -150,7 +150,7 @@ impl<R: Read> Reader<R> {
     ///
     /// # Errors
     /// It is no trace, of another version, damaged, or cut before its first chunk.
-    pub fn new(source: R) -> Result<Reader<impl Read>, ReadError> {
+    pub fn new(source: R) -> Result<Self, ReadError> {
         let mut file = Frames::new(source)?;
         let mut channels = BTreeMap::new();
         let (channel, data) = loop {
@@ -179,7 +179,7 @@ impl<R: Read> Reader<R> {
         }
         let scene: SceneRecord = parse(channel, &data, 0)?;
         fit::scene(&scene).map_err(|source| unfit(channel, 0, source))?;
-        Ok(Reader {
+        Ok(Self {
             file,
             channels,
             scene,
@@ -228,6 +228,20 @@ impl<R: Read> Reader<R> {
         }
     }
 
+    /// Behind the `end` record come the index of the file and the checksum over all of it, which
+    /// tells of damage that left each record by itself readable.
+    fn read_behind_the_end(&mut self) -> Result<(), ReadError> {
+        match self.record()? {
+            Some(_) => {
+                let what = Unfit::Place {
+                    what: "is followed by more records",
+                };
+                Err(unfit(Channel::End, self.last.time_ns, what))
+            }
+            None => Ok(()),
+        }
+    }
+
     fn span(&mut self) -> Result<Option<Span>, ReadError> {
         let (mut motions, mut events, mut states) = (Vec::new(), Vec::new(), Vec::new());
         let close = loop {
@@ -244,7 +258,10 @@ impl<R: Read> Reader<R> {
         match &close {
             Close::Mark(mark) => self.last = *mark,
             Close::Gap(_) => {}
-            Close::End(_) => self.ended = true,
+            Close::End(_) => {
+                self.ended = true;
+                self.read_behind_the_end()?;
+            }
         }
         Ok(Some(Span {
             motions,
@@ -393,17 +410,15 @@ impl From<McapError> for FrameError {
 /// The records of an MCAP file, those inside chunks as well. A chunk is handed out only once it is
 /// there as a whole and its checksum is right.
 struct Frames<R> {
-    source: R,
+    /// The first bytes, which were looked at, and the rest.
+    source: io::Chain<io::Cursor<Vec<u8>>, R>,
     reader: LinearReader,
     /// Records of the newest chunk that are not handed out yet.
     chunk: VecDeque<(u8, Vec<u8>)>,
 }
 
-impl<R> Frames<R> {
-    fn new(mut source: R) -> Result<Frames<impl Read>, ReadError>
-    where
-        R: Read,
-    {
+impl<R: Read> Frames<R> {
+    fn new(mut source: R) -> Result<Self, ReadError> {
         let mut head = Vec::new();
         let magic = mcap::MAGIC;
         source
@@ -424,15 +439,13 @@ impl<R> Frames<R> {
             .with_validate_data_section_crc(true)
             .with_validate_summary_section_crc(true)
             .with_record_length_limit(MAX_RECORD_BYTES);
-        Ok(Frames {
+        Ok(Self {
             source: io::Cursor::new(head).chain(source),
             reader: LinearReader::new_with_options(options),
             chunk: VecDeque::new(),
         })
     }
-}
 
-impl<R: Read> Frames<R> {
     fn next(&mut self) -> Result<Option<(u8, Vec<u8>)>, FrameError> {
         loop {
             if let Some(record) = self.chunk.pop_front() {

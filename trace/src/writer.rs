@@ -291,11 +291,18 @@ impl<W: Write> Writer<W> {
         self.missing
     }
 
-    /// Ends the trace and gives back what it was written to.
+    /// Ends the trace and gives back what it was written to. A trace whose last batch is older
+    /// than the end of the run lacks the rest.
     ///
     /// # Errors
     /// The file cannot be written.
     pub fn finish(mut self, ending: Ending) -> Result<W, WriteError> {
+        if ending.makespan_ns > self.last.time_ns {
+            let tick_ns = self.last.time_ns.checked_div(self.last.tick).unwrap_or(0);
+            let lacking_ns = ending.makespan_ns - self.last.time_ns;
+            let lacking = lacking_ns.checked_div(tick_ns).unwrap_or(0).max(1);
+            self.gap(self.last.tick + lacking + 1, lacking)?;
+        }
         self.mark()?;
         let end = End {
             outcome: ending.outcome,

@@ -424,7 +424,7 @@ pub(super) fn body_of(motion: &Motion) -> Who {
 fn report(findings: &mut Findings, kind: Kind, pair: &Pair, when: Interval, clearance_m: f64) {
     let (start_ns, end_ns) = pair.span_ns;
     // Casts of durations, exact far beyond any run's length.
-    let time = |part: f64| start_ns + ((end_ns - start_ns) as f64 * part) as u64;
+    let time = |part: f64| start_ns.saturating_add(((end_ns - start_ns) as f64 * part) as u64);
     let (a, b) = pair.who;
     let (a, b) = if a <= b { (a, b) } else { (b, a) };
     findings.lasting(kind, (time(when.0), time(when.1)), (a, b), || {

@@ -184,6 +184,19 @@ impl Checker {
         }
     }
 
+    /// Tests everything up to the last mark, unless where things are is unknown.
+    fn settle_all(&mut self) {
+        if self.lost_until.is_some() {
+            return;
+        }
+        let time_ns = self.last.time_ns;
+        self.bodies
+            .settle_all(time_ns, &self.rules, &mut self.findings);
+        for robot in 0..self.rules.hands.len() {
+            self.test_rigidity(Who::Robot(robot), time_ns);
+        }
+    }
+
     fn arrive(&mut self, motion: &Motion) {
         if self.bodies.is_on(motion) {
             self.settle(body_of(motion), motion.end_ns);
@@ -207,7 +220,7 @@ impl Checker {
                 format!("{who} sets out {jump_m:.6} m away from where it was")
             });
         }
-        let duration_s = (motion.end_ns - time_ns + 1) as f64 / 1e9;
+        let duration_s = ((motion.end_ns - time_ns) as f64 + 1.0) / 1e9;
         let limit = self.scene.robot.speed_m_per_s;
         let way_m = (to - from).norm();
         if way_m > limit * duration_s + WAY_SLACK_M {
@@ -312,11 +325,8 @@ impl Checker {
 
     /// Batches are missing from here on: what was so far is tested, the rest unknown.
     fn lose(&mut self, gap: Gap) {
-        if self.lost_until.is_none() {
-            self.bodies
-                .settle_all(self.last.time_ns, &self.rules, &mut self.findings);
-        }
-        self.missing_batches += gap.batches;
+        self.settle_all();
+        self.missing_batches = self.missing_batches.saturating_add(gap.batches);
         self.lost_until = Some(gap.before_tick.saturating_sub(1));
     }
 
@@ -356,9 +366,8 @@ impl Checker {
 
     /// The end of the trace; `has_ended` if it has an `end` record.
     pub(super) fn finish(mut self, has_ended: bool) -> CheckReport {
+        self.settle_all();
         if self.lost_until.is_none() {
-            self.bodies
-                .settle_all(self.last.time_ns, &self.rules, &mut self.findings);
             self.test_end();
         }
         let is_told_whole = self.end.as_ref().is_some_and(|end| end.complete);

@@ -11,9 +11,15 @@ mod bodies;
 mod checker;
 mod events;
 mod geometry;
+#[cfg(test)]
+mod geometry_tests;
 mod grid;
 mod report;
 mod rules;
+#[cfg(test)]
+mod story;
+#[cfg(test)]
+mod tests;
 
 use std::fs::File;
 use std::io::{self, BufReader, Read};
