@@ -34,6 +34,12 @@ macro_rules! builtin {
 
 /// Every shipped scenario.
 pub const BUILTIN: &[Builtin] = builtin![
+    "paper-17a",
+    "paper-17b",
+    "paper-41a",
+    "paper-41b",
+    "paper-68a",
+    "paper-68b",
     "e1",
     "e2",
     "e3",

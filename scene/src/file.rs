@@ -8,13 +8,13 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 use toml::Spanned;
 
+use crate::build::default_grasp;
 use crate::draft::{
     DEFAULT_RESOLUTION_M, Draft, Event, Move, ObjectDraft, RobotDraft, ShapeDraft, UserOrder,
     WallDraft,
 };
 use crate::lattice::Connectivity;
 use crate::problem::{Key, Problem};
-use crate::validate::default_grasp;
 
 /// A scenario: robots that bring objects to their goals among walls. Lengths in metres, durations
 /// in seconds, one world frame.

@@ -23,6 +23,9 @@ pub const MIN_EXACT_PITCH_M: f64 = 0.01;
 pub const MAX_EXACT_POINTS: u64 = 1_500_000;
 /// Most points of any lattice.
 pub const MAX_LATTICE_POINTS: u64 = 4_000_000;
+/// Most memory that the walls of all classes of bodies may take, bytes: one a lattice point
+/// and class.
+pub const MAX_RASTER_BYTES: u64 = 1 << 28;
 /// Lengths are compared as whole micrometres.
 const UM_PER_M: f64 = 1e6;
 /// A length is a whole number of micrometres if it is within this of one, µm.
@@ -152,7 +155,8 @@ impl Lattice {
         let (low, high) = input.bounds;
         let columns = line(x.base, pitch, micrometres(low.x)?, micrometres(high.x)?)?;
         let rows = line(y.base, pitch, micrometres(low.y)?, micrometres(high.y)?)?;
-        if columns.1 * rows.1 > MAX_EXACT_POINTS {
+        let points = columns.1 * rows.1;
+        if points > MAX_EXACT_POINTS || points * input.classes.len() as u64 > MAX_RASTER_BYTES {
             return None;
         }
         let coordinates = |(first, count): (i64, u64)| -> Arc<[f64]> {

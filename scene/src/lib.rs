@@ -10,17 +10,20 @@
 #![forbid(unsafe_code)]
 
 pub mod body;
+mod build;
 pub mod builtin;
 pub mod canonical;
 pub mod cspace;
 pub mod draft;
 mod file;
+mod furnish;
 pub mod generate;
 pub mod geometry;
 pub mod lattice;
 pub mod moves;
 mod orders;
 mod overlaps;
+mod polygon;
 pub mod problem;
 mod raster;
 pub mod reach;

@@ -100,7 +100,8 @@ impl Mover {
         self.space.reset(scene, ROBOT_ALONE);
         for (other, spec) in scene.objects.iter().enumerate() {
             let own = other == object;
-            if !spec.pass_under && !(own && scene.lifts_from_below(object)) {
+            let passable = spec.pass_under || own && scene.lifts_from_below(object);
+            if !passable {
                 self.space.block(scene, &spec.shape, at[other], !own);
             }
         }

@@ -4,11 +4,11 @@
 //! objects shall go, and where robots return to.
 //! Not responsible for: what lies between start and end (`reach`).
 
+use crate::build::Sound;
 use crate::draft::Draft;
 use crate::geometry::{CONTACT_M, Vec2, overlap};
 use crate::problem::{Key, Problem};
 use crate::shape::Shape;
-use crate::validate::Sound;
 
 /// Overlaps beyond this many are only counted: they share one cause.
 const MAX_REPORTED: usize = 50;

@@ -58,8 +58,7 @@ impl Plan {
             return None;
         }
         let layout = rng.clone();
-        let mut width = area / height;
-        for _ in 0..TRIES_PER_AREA {
+        for width in (area / height..).take(TRIES_PER_AREA) {
             // The same dice for each width: the plan only stretches.
             *rng = layout.clone();
             let mut plan = Self::divided(rng, (width, height), walls)?;
@@ -67,7 +66,6 @@ impl Plan {
             if excess >= 0 {
                 return plan.fill(excess).then_some(plan);
             }
-            width += 1;
         }
         None
     }

@@ -9,13 +9,14 @@ use std::sync::Arc;
 use shm_types::Counts;
 
 use crate::body::{Body, ClassId, ROBOT_ALONE};
+use crate::build::Sound;
 use crate::draft::{Draft, Event, Move, UserOrder};
 use crate::geometry::{Vec2, overlap};
 use crate::lattice::{Lattice, LatticeInput};
 use crate::problem::Problems;
 use crate::raster::Raster;
 use crate::shape::Shape;
-use crate::validate::{Sound, validate};
+use crate::validate::validate;
 
 /// The robots' common properties.
 #[derive(Clone, Debug)]

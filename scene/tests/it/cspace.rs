@@ -222,7 +222,7 @@ fn a_passage_between_the_centres_of_cells_is_found() {
 
 #[test]
 fn a_thin_wall_between_free_points_is_seen() {
-    // The robot's contacts are a quarter apart; the wall is a millimetre thin and cuts a corner.
+    // Two millimetres of wall between lattice points that are all free of it.
     let mut draft = room([0.0, 0.0, 4.0, 3.0]);
     draft.robot.shape = ShapeDraft::Circle(0.05);
     draft.resolution_m = 0.1;

@@ -33,7 +33,7 @@ fn circle() -> impl Strategy<Value = Shape> {
 }
 
 /// Any shape.
-pub fn shape() -> impl Strategy<Value = Shape> {
+pub(crate) fn shape() -> impl Strategy<Value = Shape> {
     prop_oneof![rectangle(), circle(), polygon()]
 }
 

@@ -1,4 +1,9 @@
 //! Property and message tests of the domain, against its public interface alone.
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "helpers of tests, which fail by panicking"
+)]
 
 mod cspace;
 mod files;
