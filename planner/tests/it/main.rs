@@ -1,11 +1,22 @@
 //! The planner as its users see it.
 
+#[cfg(test)]
 mod certificate;
+#[cfg(test)]
 mod easy;
+#[cfg(test)]
 mod field;
+#[cfg(test)]
 mod hard;
+#[cfg(test)]
+mod obstacles;
+#[cfg(test)]
 mod room;
+#[cfg(test)]
 mod search;
+#[cfg(test)]
 mod selection;
+#[cfg(test)]
 mod service;
+#[cfg(test)]
 mod speed;
