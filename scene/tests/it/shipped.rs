@@ -1,8 +1,10 @@
 //! Each small shipped scenario is what its comment says: the constraints it isolates, and no
-//! other, worked out here by the letter of rules 9 and 10 and nothing else.
+//! other, worked out here by the letter of rules 9 and 10 and nothing else. The rooms of the
+//! paper's sizes are held to their comments where whole runs are tested.
 
 use scene::{
-    Body, Flood, Infeasible, Occupancy, Scene, Vec2, builtin, certificate, check_certificate,
+    BUILTIN, Body, Builtin, Flood, Infeasible, Occupancy, Scene, Vec2, builtin, certificate,
+    check_certificate,
 };
 
 /// Kind, first task, second task: "E1 between 0 and 1" is `("E1", 0, 1)`.
@@ -104,7 +106,8 @@ fn each_isolates_its_constraint() {
 
 #[test]
 fn those_that_can_be_solved_carry_moves_that_do() {
-    for scenario in scene::BUILTIN {
+    let small = |scenario: &&Builtin| !scenario.name.starts_with("paper-");
+    for scenario in BUILTIN.iter().filter(small) {
         let scene = load(scenario.name);
         let solvable =
             !scenario.name.starts_with("infeasible") && scenario.name != "unreachable-goal";
