@@ -26,22 +26,23 @@ const WORDS: usize = SPAN as usize / 64;
 
 /// No point: the end of a list, or "reached from the start".
 pub(crate) const NOWHERE: u32 = u32::MAX;
-/// In place of `previous` in a point that has been served.
-const SERVED: u32 = u32::MAX - 1;
 
+/// Neighbours in a bucket's list.
 #[derive(Clone, Copy, Debug)]
-struct Node {
-    cost: u32,
-    from: u32,
+struct Link {
     next: u32,
     previous: u32,
-    round: u32,
 }
 
 /// Open list and costs of one search at a time.
 #[derive(Clone, Debug)]
 pub(crate) struct Frontier {
-    nodes: Vec<Node>,
+    /// Of each point: the round it was last reached in, and below that its cost then. Rounds
+    /// count down, so one comparison tells whether a point is untouched or reached at a
+    /// higher cost.
+    seen: Vec<u64>,
+    from: Vec<u32>,
+    links: Vec<Link>,
     round: u32,
     heads: Vec<u32>,
     occupied: [u64; WORDS],
@@ -54,16 +55,15 @@ pub(crate) struct Frontier {
 impl Frontier {
     /// Room for `points` lattice points.
     pub(crate) fn new(points: usize) -> Self {
-        let untouched = Node {
-            cost: u32::MAX,
-            from: NOWHERE,
+        let unlinked = Link {
             next: NOWHERE,
             previous: NOWHERE,
-            round: 0,
         };
         Self {
-            nodes: vec![untouched; points],
-            round: 0,
+            seen: vec![u64::MAX; points],
+            from: vec![NOWHERE; points],
+            links: vec![unlinked; points],
+            round: u32::MAX,
             heads: vec![NOWHERE; SPAN as usize],
             occupied: [0; WORDS],
             current: u32::MAX,
@@ -74,11 +74,11 @@ impl Frontier {
 
     /// Forgets everything.
     pub(crate) fn begin(&mut self) {
-        if self.round == u32::MAX {
-            self.nodes.iter_mut().for_each(|node| node.round = 0);
-            self.round = 0;
+        if self.round == 0 {
+            self.seen.fill(u64::MAX);
+            self.round = u32::MAX;
         }
-        self.round += 1;
+        self.round -= 1;
         self.occupied.fill(0);
         self.current = u32::MAX;
         self.waiting = 0;
@@ -86,11 +86,10 @@ impl Frontier {
     }
 
     /// Whether a way to `cell` that costs `cost` is better than what is known: only then is it
-    /// worth offering.
+    /// worth offering. Never for a point that was served: no later way to it is better.
     #[inline]
     pub(crate) fn improves(&self, cell: u32, cost: u32) -> bool {
-        let node = &self.nodes[cell as usize];
-        node.round != self.round || cost < node.cost && node.previous != SERVED
+        self.stamp(cost) < self.seen[cell as usize]
     }
 
     /// Offers a way to `cell` that costs `cost`, reached from `from`; `bound` is a lower bound
@@ -101,18 +100,21 @@ impl Frontier {
         if !self.improves(cell, cost) {
             return;
         }
-        let node = self.nodes[cell as usize];
-        if node.round == self.round {
-            self.unlink(cell, node, node.cost + bound);
+        if let Some(old) = self.cost(cell) {
+            self.unlink(cell, old + bound);
         }
+        let key = cost + bound;
+        debug_assert!(key >= self.current || !self.started);
         if !self.started {
-            self.current = self.current.min(cost + bound);
+            self.current = self.current.min(key);
         }
-        debug_assert!(cost + bound >= self.current || !self.started);
-        self.link(cell, from, cost, cost + bound);
+        self.seen[cell as usize] = self.stamp(cost);
+        self.from[cell as usize] = from;
+        self.link(cell, key);
     }
 
     /// The least key that waits.
+    #[inline]
     pub(crate) fn least_key(&mut self) -> Option<u32> {
         if self.waiting == 0 {
             return None;
@@ -135,10 +137,8 @@ impl Frontier {
     pub(crate) fn take(&mut self) -> Option<(u32, u32)> {
         let key = self.least_key()?;
         let cell = self.heads[(key % SPAN) as usize];
-        let node = self.nodes[cell as usize];
-        self.unlink(cell, node, key);
-        self.nodes[cell as usize].previous = SERVED;
-        Some((cell, node.cost))
+        self.unlink(cell, key);
+        Some((cell, self.seen[cell as usize] as u32))
     }
 
     /// Whether nothing waits.
@@ -149,16 +149,22 @@ impl Frontier {
     /// Cost of the best way to `cell` known, if any is.
     #[inline]
     pub(crate) fn cost(&self, cell: u32) -> Option<u32> {
-        let node = &self.nodes[cell as usize];
-        (node.round == self.round).then_some(node.cost)
+        let seen = self.seen[cell as usize];
+        ((seen >> 32) as u32 == self.round).then_some(seen as u32)
     }
 
     /// The point before `cell` on the best way to it, or [`NOWHERE`].
     pub(crate) fn from(&self, cell: u32) -> u32 {
-        self.nodes[cell as usize].from
+        self.from[cell as usize]
     }
 
-    fn link(&mut self, cell: u32, from: u32, cost: u32, key: u32) {
+    #[inline]
+    fn stamp(&self, cost: u32) -> u64 {
+        u64::from(self.round) << 32 | u64::from(cost)
+    }
+
+    #[inline]
+    fn link(&mut self, cell: u32, key: u32) {
         let bucket = (key % SPAN) as usize;
         let (word, bit) = (bucket / 64, 1 << (bucket % 64));
         let next = if self.occupied[word] & bit == 0 {
@@ -166,34 +172,32 @@ impl Frontier {
         } else {
             self.heads[bucket]
         };
-        self.nodes[cell as usize] = Node {
-            cost,
-            from,
+        self.links[cell as usize] = Link {
             next,
             previous: NOWHERE,
-            round: self.round,
         };
         if next != NOWHERE {
-            self.nodes[next as usize].previous = cell;
+            self.links[next as usize].previous = cell;
         }
         self.heads[bucket] = cell;
         self.occupied[word] |= bit;
         self.waiting += 1;
     }
 
-    fn unlink(&mut self, cell: u32, node: Node, key: u32) {
-        debug_assert!(node.previous != SERVED && cell != NOWHERE);
-        if node.next != NOWHERE {
-            self.nodes[node.next as usize].previous = node.previous;
+    #[inline]
+    fn unlink(&mut self, cell: u32, key: u32) {
+        let Link { next, previous } = self.links[cell as usize];
+        if next != NOWHERE {
+            self.links[next as usize].previous = previous;
         }
-        if node.previous == NOWHERE {
+        if previous == NOWHERE {
             let bucket = (key % SPAN) as usize;
-            self.heads[bucket] = node.next;
-            if node.next == NOWHERE {
+            self.heads[bucket] = next;
+            if next == NOWHERE {
                 self.occupied[bucket / 64] &= !(1 << (bucket % 64));
             }
         } else {
-            self.nodes[node.previous as usize].next = node.next;
+            self.links[previous as usize].next = next;
         }
         self.waiting -= 1;
     }
