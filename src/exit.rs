@@ -6,6 +6,8 @@
 
 use std::process::ExitCode;
 
+use crate::output;
+
 /// The statuses a script can rely on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
@@ -45,8 +47,17 @@ Exit status:
 pub(crate) struct Failure {
     /// Status to end with.
     pub(crate) exit: Exit,
-    /// What to tell people; a miette report where there is a place in a file to point at.
-    pub(crate) report: miette::Report,
+    /// What to tell people.
+    pub(crate) complaint: Complaint,
+}
+
+/// What to tell people when something has failed.
+#[derive(Debug)]
+pub(crate) enum Complaint {
+    /// A sentence.
+    Sentence(String),
+    /// A report that points at places in a file.
+    Report(miette::Report),
 }
 
 impl Failure {
@@ -54,7 +65,7 @@ impl Failure {
     pub(crate) fn new(exit: Exit, message: impl std::fmt::Display) -> Self {
         Self {
             exit,
-            report: miette::Report::msg(message.to_string()),
+            complaint: Complaint::Sentence(message.to_string()),
         }
     }
 
@@ -63,9 +74,20 @@ impl Failure {
         Self::new(Exit::System, message)
     }
 
-    /// Prints the report to stderr.
+    /// A file that is no good.
+    pub(crate) fn bad_input(report: impl Into<miette::Report>) -> Self {
+        Self {
+            exit: Exit::BadInput,
+            complaint: Complaint::Report(report.into()),
+        }
+    }
+
+    /// Prints the complaint to stderr.
     pub(crate) fn print(&self) {
-        crate::output::complain(&format!("{:?}", self.report));
+        match &self.complaint {
+            Complaint::Sentence(text) => output::complain(&format!("error: {text}")),
+            Complaint::Report(report) => output::complain(&format!("{report:?}")),
+        }
     }
 }
 

@@ -6,6 +6,8 @@
 
 use std::io::{self, IsTerminal, Write};
 
+use miette::MietteHandlerOpts;
+
 use crate::exit::Failure;
 
 /// Writes `text` to stdout. A reader that has gone away is no error: it has seen enough.
@@ -41,6 +43,18 @@ pub(crate) fn complain(message: &str) {
     let _ = writeln!(io::stderr().lock(), "{}", message.trim_end());
 }
 
+/// Leaves lines of reports whole where no terminal bounds them, so that a script finds file, line
+/// and reason in one. Comes before the first report.
+pub(crate) fn unfold_reports() {
+    if io::stderr().is_terminal() {
+        return;
+    }
+    // Fails only if it was done already.
+    let _ = miette::set_hook(Box::new(|_| {
+        Box::new(MietteHandlerOpts::new().wrap_lines(false).build())
+    }));
+}
+
 /// Whether people are watching stderr, so that a progress display is of use.
 pub(crate) fn is_watched() -> bool {
     io::stderr().is_terminal() && std::env::var_os("TERM").is_none_or(|term| term != "dumb")
@@ -54,4 +68,12 @@ pub(crate) fn wants_colour() -> bool {
 /// Whether `NO_COLOR` is set to anything but nothing (<https://no-color.org>).
 pub(crate) fn no_colour() -> bool {
     std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty())
+}
+
+/// A number with its noun: "1 robot", "2 robots".
+pub(crate) fn count(number: u64, noun: &str) -> String {
+    match number {
+        1 => format!("1 {noun}"),
+        number => format!("{number} {noun}s"),
+    }
 }

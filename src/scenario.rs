@@ -33,10 +33,7 @@ pub(crate) fn load(name: &str, robots: Option<u32>) -> Result<Loaded, Failure> {
         Some(builtin) => (Cow::Borrowed(builtin.text), format!("built-in {name}")),
         None => (Cow::Owned(read(name)?), name.to_owned()),
     };
-    let whole = scene::parse(&text, &source).map_err(|error| Failure {
-        exit: Exit::BadInput,
-        report: error.into(),
-    })?;
+    let whole = scene::parse(&text, &source).map_err(Failure::bad_input)?;
     Ok(Loaded {
         scene: match robots {
             None => whole,

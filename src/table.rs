@@ -5,6 +5,7 @@
 
 use comfy_table::{Cell, Color, ContentArrangement, Table, presets};
 
+use crate::output::count;
 use crate::result::{Ending, RunResult};
 
 /// The result as a table of two columns, ending in a newline.
@@ -66,8 +67,12 @@ fn rows(result: &RunResult) -> Vec<(&'static str, String)> {
     let mut rows = vec![(
         "scenario",
         format!(
-            "{}: {} objects, {} robots, {}, {}",
-            result.scenario, result.objects, result.robots, result.method, result.driver
+            "{}: {}, {}, {}, {}",
+            result.scenario,
+            count(result.objects as u64, "object"),
+            count(result.robots as u64, "robot"),
+            result.method,
+            result.driver
         ),
     )];
     if let Some(makespan) = result.makespan_s {
@@ -91,15 +96,20 @@ fn rows(result: &RunResult) -> Vec<(&'static str, String)> {
     rows.push((
         "work",
         format!(
-            "{} polygon tests, {} path plans, {} cells expanded, {} selections",
-            counts.polygon_tests, counts.path_plans, counts.cells_expanded, counts.selections
+            "{}, {}, {} expanded, {}",
+            count(counts.polygon_tests, "polygon test"),
+            count(counts.path_plans, "path plan"),
+            count(counts.cells_expanded, "cell"),
+            count(counts.selections, "selection")
         ),
     ));
     rows.push((
         "constraints",
         format!(
-            "{} easy, {} hard, {} failed tasks",
-            counts.easy_constraints, counts.hard_constraints, counts.task_failures
+            "{} easy, {} hard, {}",
+            counts.easy_constraints,
+            counts.hard_constraints,
+            count(counts.task_failures, "failed task")
         ),
     ));
     if let Some(checker) = &result.checker {
@@ -109,8 +119,9 @@ fn rows(result: &RunResult) -> Vec<(&'static str, String)> {
             ", but the trace is incomplete"
         };
         let line = format!(
-            "{} violations in {} swept tests{complete}",
-            checker.violations, checker.swept_tests
+            "{} in {}{complete}",
+            count(checker.violations, "violation"),
+            count(checker.swept_tests, "swept test")
         );
         rows.push(("checker", line));
         rows.extend(checker.first.iter().map(|text| ("violation", text.clone())));

@@ -81,10 +81,10 @@ fn text(report: &Report) -> String {
         table.add_row(cells(row));
     }
     format!(
-        "{}: {} robots, {} objects, tick {} ms, {}\n{}\n{}\n{}",
+        "{}: {}, {}, tick {} ms, {}\n{}\n{}\n{}",
         report.scenario,
-        report.robots,
-        report.objects,
+        output::count(report.robots as u64, "robot"),
+        output::count(report.objects as u64, "object"),
         report.settings.tick_ns as f64 / 1e6,
         report.settings.method,
         report.machine,

@@ -51,15 +51,16 @@ fn text(report: &CheckReport) -> String {
     let violations = report.violations.len() as u64 + report.unlisted_violations;
     let _ = writeln!(
         text,
-        "{violations} violations in {:.3} s of world time, {} swept tests",
+        "{} in {:.3} s of world time, {}",
+        output::count(violations, "violation"),
         report.checked_until_ns as f64 / 1e9,
-        report.swept_tests
+        output::count(report.swept_tests, "swept test")
     );
     if report.missing_batches > 0 {
         let _ = writeln!(
             text,
-            "the trace is incomplete: {} batches of motion are missing",
-            report.missing_batches
+            "the trace is incomplete: {} of motion missing",
+            output::count(report.missing_batches, "tick")
         );
     }
     text

@@ -20,10 +20,12 @@ use tracing_subscriber::EnvFilter;
 
 use crate::cli::{Cli, Command, Workload};
 use crate::exit::Outcome;
+use crate::output;
 
 /// Does what the command line asks for.
 pub(crate) fn execute(cli: Cli) -> ExitCode {
     log_to_stderr();
+    output::unfold_reports();
     match dispatch(cli.command) {
         Ok(exit) => exit.into(),
         Err(failure) => {
@@ -54,7 +56,7 @@ fn dispatch(command: Command) -> Outcome {
 
 fn log_to_stderr() {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
-    let colour = std::io::stderr().is_terminal() && !crate::output::no_colour();
+    let colour = std::io::stderr().is_terminal() && !output::no_colour();
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)

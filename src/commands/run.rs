@@ -189,7 +189,10 @@ fn ending(finished: &Finished, checker: Option<&Checker>) -> (Ending, Option<Str
     let reason = finished.reason.clone();
     let violations = checker.map_or(0, |checker| checker.violations);
     if violations > 0 {
-        let found = format!("the checker found {violations} violations");
+        let found = format!(
+            "the checker found {}",
+            output::count(violations, "violation")
+        );
         return (Ending::Violated, Some(found));
     }
     match finished.outcome {

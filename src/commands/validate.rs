@@ -43,9 +43,9 @@ fn summary(scene: &Scene) -> String {
     let _ = writeln!(text, "{}: ok", scene.name);
     let _ = writeln!(
         text,
-        "  {} robots, {} objects ({} with a goal), room of {:.2} m by {:.2} m",
-        scene.homes.len(),
-        scene.objects.len(),
+        "  {}, {} ({} with a goal), room of {:.2} m by {:.2} m",
+        output::count(scene.homes.len() as u64, "robot"),
+        output::count(scene.objects.len() as u64, "object"),
         with_goal.count(),
         upper.x - lower.x,
         upper.y - lower.y

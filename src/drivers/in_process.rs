@@ -3,7 +3,7 @@
 //! Responsible for: ticking the simulation, writing its trace and hashes, timing the ticks.
 //! Not responsible for: the order of things within a tick (crate `sim`).
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::time::Instant;
@@ -20,6 +20,7 @@ use crate::drivers::interrupt::Interrupt;
 use crate::drivers::recording::Recording;
 use crate::exit::Failure;
 use crate::progress::{PERIOD, Progress};
+use crate::result::{RoleLine, seconds};
 
 /// Identity of a run in process: there is never another one to tell it from.
 const RUN_ID: u64 = 0;
@@ -71,6 +72,12 @@ pub(crate) fn run(
         file.flush().map_err(unwritten)?;
     }
     let report = simulation.report();
+    let roles = vec![RoleLine {
+        role: "in-process".to_owned(),
+        pid: std::process::id(),
+        ticks_answered: report.ticks,
+        cpu_s: cpu_s(),
+    }];
     let check = recording
         .finish(ending(&report, options))
         .map_err(Failure::system)?;
@@ -78,8 +85,16 @@ pub(crate) fn run(
         check: Some(check),
         wall_s,
         latency,
+        roles,
         ..finished(report)
     })
+}
+
+/// Processor time of this thread so far, seconds, where the kernel tells.
+fn cpu_s() -> f64 {
+    let text = fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    let first = text.split_whitespace().next();
+    first.and_then(|ns| ns.parse().ok()).map_or(0.0, seconds)
 }
 
 fn create(path: &Path) -> Result<BufWriter<File>, Failure> {
