@@ -7,7 +7,9 @@
 //! of measured times, rounded up to whole units, so that virtual planning time is deterministic
 //! whatever the machine does.
 
-/// One test whether two convex bodies overlap, standing or swept.
+/// One test whether two convex bodies overlap, standing or swept. Measured: 10 to 17 ns for a
+/// robot with its object against an object, boxes, where a cell takes 55 ns
+/// (`planner/tests/it/speed.rs`).
 pub const UNITS_PER_POLYGON_TEST: u64 = 1;
 /// One obstacle entered into the configuration space of a body.
 pub const UNITS_PER_OBSTACLE: u64 = 16;
