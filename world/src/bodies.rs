@@ -15,8 +15,8 @@ use std::cell::Cell;
 use scene::{Body, ClassId, Scene, Vec2, swept_overlap, swept_regions_overlap};
 
 use crate::broad::{Aabb, Ground, Walls};
-use crate::path::Track;
 use crate::state::Robot;
+use crate::track::Track;
 
 /// What of a grounded object counts for one robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

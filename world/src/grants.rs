@@ -1,9 +1,9 @@
 //! Grants: space is given to one robot before it moves, so that no two ever collide, whatever is
 //! late, stale or dead.
 //!
-//! Responsible for: the queue of open requests, oldest first and then by id; how far each is
-//! granted in this tick. Not responsible for: whether a request is sound (`requests.rs`), moving
-//! along what is granted (`motion.rs`).
+//! Responsible for: the queue of open requests, oldest first and then by id; what each is granted
+//! in this tick. Not responsible for: whether a request is sound (`requests.rs`), what is in the
+//! way of one (`extension.rs`), moving along what is granted (`motion.rs`).
 //!
 //! Terms: the *region* of a robot is what its body covers from where it stands along all that is
 //! granted to it. Two passes a tick:
@@ -21,28 +21,14 @@ use scene::{Scene, Vec2};
 
 use crate::bodies::{Bodies, Sweep};
 use crate::broad::Aabb;
-use crate::path::{ARRIVAL_M, Track};
+use crate::extension::{Field, Refusal, farthest};
+use crate::path::ARRIVAL_M;
 use crate::state::Robot;
+use crate::track::Track;
 
 /// Into how many equal steps the motion of one tick is cut where it cannot be granted whole: a
 /// robot stops at most this share of it short of what is in its way.
 const STEPS_PER_TICK: f64 = 64.0;
-
-/// Why an extension is refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Refusal {
-    /// A grounded object is in the way.
-    Object,
-    /// Another robot is.
-    Robot(usize),
-}
-
-/// One tick of extension, for one robot.
-struct Farthest {
-    /// Where the extension ends, and whether that is the segment's own end.
-    end: Option<(Vec2, bool)>,
-    refusal: Option<Refusal>,
-}
 
 /// The passes' working memory, kept over ticks.
 #[derive(Clone, Debug)]
@@ -118,8 +104,9 @@ impl Grants {
         {
             let from = robots[i].grant_end();
             let length_m = (to - from).norm();
+            let field = self.field(around, robots);
             let farthest = farthest(from, to, length_m, self.tick_m, |end| {
-                self.check_in_space(around, robots, i, from, end)
+                field.check_in_space(i, from, end)
             });
             let Some((end, whole)) = farthest.end else {
                 break;
@@ -172,8 +159,9 @@ impl Grants {
             }
             let from = track.end();
             let step_m = self.tick_m / STEPS_PER_TICK;
+            let field = self.field(around, robots);
             let farthest = farthest(from, to, left_m, step_m, |end| {
-                self.check_in_time(around, robots, i, &track, end)
+                field.check_in_time(i, end, self.tick_m)
             });
             if let Some(Refusal::Robot(other)) = farthest.refusal {
                 self.blocked_by[i] = Some(other);
@@ -217,58 +205,13 @@ impl Grants {
         }
     }
 
-    fn check_in_space(
-        &self,
-        around: Surroundings<'_>,
-        robots: &[Robot],
-        i: usize,
-        from: Vec2,
-        to: Vec2,
-    ) -> Result<(), Refusal> {
-        let sweep = check_ground(around, &robots[i], from, to)?;
-        let region = around.bodies.region(sweep, true);
-        for (j, other) in robots.iter().enumerate() {
-            if j == i || !region.meets(&self.regions[j]) {
-                continue;
-            }
-            if meets_path(around, sweep, other, other.position, other.grant.points()) {
-                return Err(Refusal::Robot(j));
-            }
+    fn field<'a>(&'a self, around: Surroundings<'a>, robots: &'a [Robot]) -> Field<'a> {
+        Field {
+            scene: around.scene,
+            bodies: around.bodies,
+            robots,
+            regions: &self.regions,
         }
-        Ok(())
-    }
-
-    fn check_in_time(
-        &self,
-        around: Surroundings<'_>,
-        robots: &[Robot],
-        i: usize,
-        track: &Track,
-        to: Vec2,
-    ) -> Result<(), Refusal> {
-        let sweep = check_ground(around, &robots[i], track.end(), to)?;
-        let region = around.bodies.region(sweep, true);
-        let longer = track.then(to);
-        for (j, other) in robots.iter().enumerate() {
-            if j == i || !region.meets(&self.regions[j]) {
-                continue;
-            }
-            let ahead = &other.grant.points()[other.track.used()..];
-            let after =
-                !ahead.is_empty() && meets_path(around, sweep, other, other.track.end(), ahead);
-            let meets = after
-                || around.bodies.tracks_meet(
-                    around.scene,
-                    (sweep.class, &longer),
-                    true,
-                    (other.class(around.scene), &other.track),
-                    (track.moved_m(), self.tick_m),
-                );
-            if meets {
-                return Err(Refusal::Robot(j));
-            }
-        }
-        Ok(())
     }
 }
 
@@ -303,100 +246,6 @@ fn region_of(around: Surroundings<'_>, robot: &Robot) -> Aabb {
         .fold(standing, |region, &point| {
             region.joined(around.bodies.region(Sweep::standing(class, point), false))
         })
-}
-
-/// Whether a sweep with clearance meets the body of `other` along `path` from `start`.
-fn meets_path(
-    around: Surroundings<'_>,
-    sweep: Sweep,
-    other: &Robot,
-    start: Vec2,
-    path: &[Vec2],
-) -> bool {
-    let class = other.class(around.scene);
-    let mut from = start;
-    if path.is_empty() {
-        let standing = Sweep::standing(class, start);
-        return around
-            .bodies
-            .sweeps_meet(around.scene, sweep, true, standing);
-    }
-    path.iter().any(|&to| {
-        let piece = Sweep { class, from, to };
-        from = to;
-        around.bodies.sweeps_meet(around.scene, sweep, true, piece)
-    })
-}
-
-fn check_ground(
-    around: Surroundings<'_>,
-    robot: &Robot,
-    from: Vec2,
-    to: Vec2,
-) -> Result<Sweep, Refusal> {
-    let Surroundings { scene, bodies } = around;
-    let sweep = Sweep {
-        class: robot.class(scene),
-        from,
-        to,
-    };
-    let waiver = |object| bodies.waiver(scene, robot, object);
-    match bodies.object_met(scene, sweep, true, waiver) {
-        Some(_) => Err(Refusal::Object),
-        None => Ok(sweep),
-    }
-}
-
-/// The farthest point from `from` towards `to`, at most `limit_m` away, that `check` lets pass:
-/// the whole way, or else a multiple of `step_m`.
-fn farthest(
-    from: Vec2,
-    to: Vec2,
-    limit_m: f64,
-    step_m: f64,
-    mut check: impl FnMut(Vec2) -> Result<(), Refusal>,
-) -> Farthest {
-    let length_m = (to - from).norm();
-    let whole = length_m <= limit_m + ARRIVAL_M;
-    let limit_m = limit_m.min(length_m);
-    let towards = (to - from) / length_m.max(ARRIVAL_M);
-    let end = if whole { to } else { from + towards * limit_m };
-    let Err(mut refusal) = check(end) else {
-        return Farthest {
-            end: Some((end, whole)),
-            refusal: None,
-        };
-    };
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a positive number of steps within a room"
-    )]
-    let (mut granted, mut refused) = (0_u32, ((limit_m / step_m).ceil() as u32).max(1));
-    let mut farthest = None;
-    while refused - granted > 1 {
-        // The first step first: whoever stands right in front of something asks but twice.
-        let steps = if granted == 0 {
-            1
-        } else {
-            granted + (refused - granted) / 2
-        };
-        let end = from + towards * (f64::from(steps) * step_m);
-        match check(end) {
-            Ok(()) => {
-                granted = steps;
-                farthest = Some((end, false));
-            }
-            Err(nearer) => {
-                refused = steps;
-                refusal = nearer;
-            }
-        }
-    }
-    Farthest {
-        end: farthest,
-        refusal: Some(refusal),
-    }
 }
 
 #[cfg(test)]

@@ -261,9 +261,10 @@ mod tests {
     use shm_types::{EventKind, Outcome};
 
     use super::*;
-    use crate::path::{Path, Track};
+    use crate::path::Path;
     use crate::state::Hand;
     use crate::testing::{BELOW, Bench, room};
+    use crate::track::Track;
 
     const OBJECTS: [[[f64; 2]; 2]; 2] = [[[1.0, 1.45], [1.0, 5.0]], [[5.0, 3.0], [5.0, 5.0]]];
 

@@ -26,6 +26,7 @@ mod commands;
 mod constraints;
 mod control;
 mod epoch;
+mod extension;
 mod grants;
 mod grip;
 mod invariants;
@@ -41,6 +42,7 @@ mod step;
 mod tasks;
 #[cfg(test)]
 mod testing;
+mod track;
 mod wire;
 
 pub use accounts::{ActivityTimes, WorldCounters};

@@ -342,11 +342,11 @@ fn random_commands_grasp_and_move_objects() {
 
     let mut runner = TestRunner::deterministic();
     let mut grasped = 0;
-    for _ in 0..60 {
+    for _ in 0..30 {
         let acts = proptest::collection::vec(act(), 60..80)
             .new_tree(&mut runner)
             .unwrap();
         grasped += run(false, false, &acts.current()).unwrap().1;
     }
-    assert!(grasped >= 25, "only {grasped} grasps in 60 runs");
+    assert!(grasped >= 10, "only {grasped} grasps in 30 runs");
 }

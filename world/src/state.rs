@@ -10,7 +10,8 @@ use shm_types::{Activity, Grip, Phase, TaskStatus};
 
 use crate::ActivityTimes;
 use crate::control::FIRST_INCARNATION;
-use crate::path::{Path, Track};
+use crate::path::Path;
+use crate::track::Track;
 
 /// A robot's hold on an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

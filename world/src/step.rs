@@ -19,8 +19,8 @@ use crate::grants::{Grants, Surroundings};
 use crate::invariants::Violation;
 use crate::journal::{Event, Journal};
 use crate::motion::{self, Span};
-use crate::path::Track;
 use crate::state::{Object, Robot};
+use crate::track::Track;
 
 /// What one step of the world takes in.
 #[derive(Clone, Copy)]

@@ -279,13 +279,15 @@ mod tests {
         assert_eq!(plain, changed);
     }
 
+    type Change = Box<dyn Fn(&mut World)>;
+
     #[test]
     fn flipping_any_private_field_changes_the_hash() {
         let failure = PendingFailure {
             report: Failure::default(),
             since_ns: 4,
         };
-        let changes: Vec<Box<dyn Fn(&mut World)>> = vec![
+        let changes: Vec<Change> = vec![
             Box::new(|w| w.robots[1].rest.push(Vec2::new(8.0, 4.0))),
             Box::new(|w| w.robots[1].request_tick += 1),
             Box::new(|w| w.robots[1].cut = true),

@@ -6,6 +6,7 @@ use std::cell::Cell;
 use shm_types::{ConstraintKind, ControlKind, FailureCause, NONE, Outcome};
 use world::{World, WorldInput};
 
+#[cfg(test)]
 #[path = "../src/testing.rs"]
 #[allow(dead_code, reason = "the unit tests use the rest of it")]
 mod testing;
