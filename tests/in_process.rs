@@ -1,10 +1,13 @@
-//! Whole runs in one thread: every small scenario, every number of robots, every method.
+//! Whole runs in one thread: every small scenario and random rooms, every number of robots, every
+//! method. Each run is traced and checked by a checker that shares no planning code (rule 26).
 
 use std::ops::ControlFlow;
 
-use scene::{Method, Scene, Settings, builtin::BUILTIN};
-use shm_types::{Activity, MotionBatch, Outcome, WorldSnapshot};
+use scene::builtin::BUILTIN;
+use scene::{Compute, GenerateOptions, Method, Scene, Settings};
+use shm_types::{Activity, Checked, MotionBatch, Outcome, WorldSnapshot};
 use sim::{SimReport, Simulation};
+use trace::{Ending, SceneRecord, Writer};
 
 const NS_PER_S: u64 = 1_000_000_000;
 
@@ -25,24 +28,50 @@ fn with(method: Method) -> Settings {
 
 /// Runs to the end; checks what must hold of every run.
 fn run(scene: &Scene, settings: &Settings) -> SimReport {
-    let mut before = (0, 0);
-    let mut watch = |snapshot: &WorldSnapshot, motion: &MotionBatch| {
-        let header = &snapshot.header;
-        assert_eq!(header.tick, before.0 + 1);
-        assert!(header.epoch == before.1 || header.epoch == before.1 + 1 || header.tick == 1);
-        assert_eq!(motion.tick, header.tick);
-        before = (header.tick, header.epoch);
-        ControlFlow::Continue(())
-    };
-    let report = Simulation::new(scene, settings, 1).run(&mut watch);
     let who = format!(
         "{} × {} × {}",
         scene.name,
         scene.homes.len(),
         settings.method
     );
+    let record = SceneRecord::new(scene, settings, 1);
+    let mut writer = Writer::new(Vec::new(), &record, NS_PER_S).unwrap();
+    let (mut tick, mut epoch) = (0, 0);
+    let mut watch = |snapshot: &WorldSnapshot, motion: &MotionBatch| {
+        let header = &snapshot.header;
+        assert_eq!((header.tick, motion.tick), (tick + 1, tick + 1), "{who}");
+        assert!(
+            epoch == 0 || header.epoch == epoch || header.epoch == epoch + 1,
+            "{who}"
+        );
+        (tick, epoch) = (header.tick, header.epoch);
+        writer.batch(motion).unwrap();
+        writer
+            .snapshot(Checked::new(snapshot, scene.counts()).unwrap())
+            .unwrap();
+        ControlFlow::Continue(())
+    };
+    let report = Simulation::new(scene, settings, 1).run(&mut watch);
+    let ending = Ending {
+        outcome: report.outcome.into(),
+        reason: report.reason.clone(),
+        makespan_ns: report.time_ns,
+        options: serde_json::Value::Null,
+    };
+    let checked = trace::check(writer.finish(ending).unwrap().as_slice()).unwrap();
+    assert!(checked.complete, "{who}");
+    assert_eq!(checked.violations, [], "{who}");
+    check(&report, &who);
+    report
+}
+
+fn check(report: &SimReport, who: &str) {
     assert_eq!(report.world.violations, 0, "{who}: {:?}", report.reason);
-    assert_eq!(report.world.selection_conflicts, 0, "{who}");
+    assert_eq!(
+        report.world.selection_conflicts, 0,
+        "{who}: robots select differently"
+    );
+    assert_eq!(report.world.invalid_claims, 0, "{who}");
     assert_eq!(report.world.invalid_requests, 0, "{who}");
     assert_eq!(report.world.stale_commands, 0, "{who}");
     for robot in &report.robots {
@@ -53,22 +82,20 @@ fn run(scene: &Scene, settings: &Settings) -> SimReport {
         Outcome::Stuck => assert!(report.reason.is_some(), "{who}"),
         other => panic!("{who}: {other:?} after {} s", report.time_ns / NS_PER_S),
     }
-    report
 }
 
-/// The scenarios that isolate one thing each.
-fn small() -> impl Iterator<Item = Scene> {
-    BUILTIN
-        .iter()
-        .filter(|scenario| !scenario.name.starts_with("paper-"))
-        .map(|scenario| parse(scenario.name, scenario.text))
+/// The scene with its first robot, its first two, and so on.
+fn with_each_number_of_robots(scene: &Scene) -> impl Iterator<Item = Scene> {
+    (1..=scene.homes.len()).map(|robots| scene.with_robots(robots).unwrap())
 }
 
 #[test]
 fn every_small_run_ends_solved_or_stuck_for_a_reason() {
-    for scene in small() {
-        for robots in 1..=scene.homes.len() {
-            let scene = scene.with_robots(robots).unwrap();
+    let small = BUILTIN
+        .iter()
+        .filter(|scenario| !scenario.name.starts_with("paper-"));
+    for scenario in small {
+        for scene in with_each_number_of_robots(&parse(scenario.name, scenario.text)) {
             for &method in Method::ALL {
                 run(&scene, &with(method));
             }
@@ -77,16 +104,54 @@ fn every_small_run_ends_solved_or_stuck_for_a_reason() {
 }
 
 #[test]
-fn rooms_that_the_methods_can_finish_are_finished() {
-    for name in ["e1", "h1"] {
-        let scene = shipped(name);
-        for robots in 1..=scene.homes.len() {
-            let scene = scene.with_robots(robots).unwrap();
+fn random_rooms_end_solved_or_stuck_for_a_reason() {
+    let mut solved = 0;
+    for seed in 0..10 {
+        let options = GenerateOptions {
+            seed,
+            ..GenerateOptions::default()
+        };
+        let room = scene::generate(&options).unwrap().scene;
+        for scene in with_each_number_of_robots(&room) {
             for &method in Method::ALL {
                 let report = run(&scene, &with(method));
+                solved += u32::from(report.outcome == Outcome::Solved);
+            }
+        }
+    }
+    assert!(solved > 20, "{solved}");
+}
+
+/// What each method can see, it finishes, and what it cannot see it gets stuck on, with one robot
+/// and with two.
+#[test]
+fn methods_finish_what_they_can_see() {
+    use Method::{All, GraspingAndRestricted, NoAction, Restricted};
+    let every: &[Method] = &[GraspingAndRestricted, Restricted, All, NoAction];
+    let easy: &[Method] = &[GraspingAndRestricted, All];
+    let finished_by = [
+        ("e1", every),
+        ("e2", easy),
+        ("e3", every),
+        ("e4", easy),
+        ("h1", every),
+        ("h2", &[All]),
+        ("blocked-approach", every),
+        ("joint-blockers", every),
+        ("head-on-corridor", every),
+        ("lift-from-below", every),
+        ("blocked-return", &[]),
+        ("swap", &[]),
+    ];
+    for (name, methods) in finished_by {
+        for scene in with_each_number_of_robots(&shipped(name)) {
+            for method in Method::ALL {
+                let outcome = run(&scene, &with(*method)).outcome;
+                let expected = methods.contains(method);
+                let robots = scene.homes.len();
                 assert_eq!(
-                    report.outcome,
-                    Outcome::Solved,
+                    outcome == Outcome::Solved,
+                    expected,
                     "{name} × {robots} × {method}"
                 );
             }
@@ -150,7 +215,7 @@ fn one_computer_for_all_is_slower_than_one_each() {
         ..with(Method::All)
     };
     let shared = Settings {
-        compute: scene::Compute::Shared,
+        compute: Compute::Shared,
         ..own.clone()
     };
     assert!(run(&scene, &shared).time_ns > run(&scene, &own).time_ns);

@@ -45,5 +45,5 @@ pub(crate) fn act(
 
 /// Stays at home until a new epoch calls.
 pub(crate) fn stay(now: &Now<'_>) -> Next {
-    Next::Rest(Phase::Idle, Doing::idle(now.change()))
+    Next::Rest(Phase::Idle, Doing::idle(now.counted().change))
 }

@@ -68,8 +68,17 @@ pub(crate) struct Look {
     begun: bool,
     /// Where the first leg starts.
     from: Vec2,
-    /// Value of the snapshot's `change` when the look began.
-    change: u64,
+    /// What the snapshot counted when the look began.
+    seen: Counted,
+}
+
+/// Counts of a snapshot that tell whether there is anything new to see.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Counted {
+    /// See [`shm_types::SnapshotHeader::change`].
+    pub(crate) change: u64,
+    /// See [`shm_types::SnapshotHeader::placements`].
+    pub(crate) placements: u64,
 }
 
 impl Leg {
@@ -131,7 +140,7 @@ impl Look {
             robots: Robots::Include,
             begun: false,
             from: now.grant_end(),
-            change: now.change(),
+            seen: now.counted(),
         }
     }
 
@@ -145,9 +154,9 @@ impl Look {
         self.from
     }
 
-    /// Value of the snapshot's `change` when it began.
-    pub(crate) fn change(&self) -> u64 {
-        self.change
+    /// What the snapshot counted when it began.
+    pub(crate) fn seen(&self) -> Counted {
+        self.seen
     }
 
     /// How far it goes.
@@ -163,7 +172,8 @@ impl Look {
             u64::from(self.on_second),
             u64::from(self.robots == Robots::Ignore),
             u64::from(self.begun),
-            self.change,
+            self.seen.change,
+            self.seen.placements,
         ]);
     }
 

@@ -7,6 +7,8 @@ use planner::obstacles;
 use scene::{CONTACT_M, Scene, Vec2, vec};
 use shm_types::{Activity, Checked, ConstraintTable, HardAnswer, RobotState, WorldSnapshot, index};
 
+use crate::look::Counted;
+
 /// The present tick, seen by one robot.
 #[derive(Clone, Copy)]
 pub(crate) struct Now<'a> {
@@ -38,9 +40,12 @@ impl<'a> Now<'a> {
         self.snapshot.header.epoch
     }
 
-    /// See [`shm_types::SnapshotHeader::change`].
-    pub(crate) fn change(&self) -> u64 {
-        self.snapshot.header.change
+    /// What tells whether there is anything new to see.
+    pub(crate) fn counted(&self) -> Counted {
+        Counted {
+            change: self.snapshot.header.change,
+            placements: self.snapshot.header.placements,
+        }
     }
 
     /// What the robot holds.

@@ -11,7 +11,7 @@ use shm_types::StateHash;
 use crate::account::Thinking;
 use crate::blocker;
 use crate::intent::Intent;
-use crate::look::{Blocker, Leg, Look, Seen, View};
+use crate::look::{Blocker, Counted, Leg, Look, Seen, View};
 use crate::now::{Now, same_place};
 use crate::request::Fate;
 
@@ -30,8 +30,8 @@ pub(crate) struct Trip {
     still_since_ns: u64,
     /// When the last look ended.
     looked_ns: u64,
-    /// Value of `change` when the last look began.
-    looked_change: u64,
+    /// What the snapshot counted when the last look began.
+    seen: Counted,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -88,7 +88,7 @@ impl Trip {
             blocked_since_ns: None,
             still_since_ns: now.time_ns(),
             looked_ns: now.time_ns(),
-            looked_change: now.change(),
+            seen: now.counted(),
         }
     }
 
@@ -145,7 +145,7 @@ impl Trip {
     ) -> Option<Progress> {
         self.looked_ns = now.time_ns();
         self.still_since_ns = now.time_ns();
-        self.looked_change = look.change();
+        self.seen = look.seen();
         match seen {
             Seen::Way if !same_place(look.from(), now.grant_end()) => {
                 self.state = State::Looking(look.again(now));
@@ -217,7 +217,7 @@ impl Trip {
             return Some(Progress::Underway);
         }
         let since_ns = *self.blocked_since_ns.get_or_insert(self.still_since_ns);
-        if now.change() != self.looked_change {
+        if now.counted() != self.seen {
             intent.drop_rest(now);
             self.state = State::Looking(Look::new(now, View::Leg(self.leg)));
             return None;
@@ -225,8 +225,8 @@ impl Trip {
         Some(self.stalled(Blocker::Robot(blocker::nearest(now)), since_ns))
     }
 
-    /// No way was found. The robot looks again now and then, as long as there is something new
-    /// to see.
+    /// No way was found. The robot looks again whenever something was grasped or put down or a
+    /// constraint is new, and else now and then, as long as there is something new to see.
     fn wait(
         &mut self,
         now: &Now<'_>,
@@ -234,8 +234,9 @@ impl Trip {
         blocker: Blocker,
         view: View,
     ) -> Option<Progress> {
-        let is_due = now.time_ns() >= self.looked_ns + thinking.settings.look_again_ns;
-        if is_due && now.change() != self.looked_change {
+        let is_due = now.time_ns() >= self.looked_ns + thinking.settings.look_again_ns
+            || now.counted().placements != self.seen.placements;
+        if is_due && now.counted() != self.seen {
             self.state = State::Looking(Look::new(now, view));
             return None;
         }
@@ -247,7 +248,7 @@ impl Trip {
         Progress::Stalled {
             blocker,
             since_ns,
-            looked_change: self.looked_change,
+            looked_change: self.seen.change,
         }
     }
 
@@ -261,10 +262,11 @@ impl Trip {
         hash.add(&[
             leg,
             task,
-            self.blocked_since_ns.map_or(u64::MAX, |since| since),
+            self.blocked_since_ns.unwrap_or(u64::MAX),
             self.still_since_ns,
             self.looked_ns,
-            self.looked_change,
+            self.seen.change,
+            self.seen.placements,
         ]);
         match self.state {
             State::Looking(look) => look.hash_into(hash),
