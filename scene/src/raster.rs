@@ -135,7 +135,7 @@ impl Raster {
             }
         }
         let below = rows.start - 1;
-        for column in columns.start - 1..=columns.end {
+        for column in (columns.start - 1).max(0)..(columns.end + 1).min(i64::from(lattice.width)) {
             if columns.contains(&column) {
                 self.set(lattice, column, below, NORTH);
             }

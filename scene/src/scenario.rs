@@ -89,23 +89,28 @@ impl Report<'_> {
     }
 
     fn problems(&self, file: &ScenarioFile, problems: &[Problem]) -> ScenarioError {
-        let located = problems
-            .iter()
-            .map(|problem| {
-                let span = file.place(problem.key);
-                let mut labels = Vec::new();
-                if let Some(span) = &span {
-                    labels.push(label(&problem.key.to_string(), span));
+        let mut located = Vec::new();
+        let mut said: Vec<(Range, &str)> = Vec::new();
+        for problem in problems {
+            let place = file.place(problem.key);
+            let span = place.clone().unwrap_or(0..0);
+            // What all objects have from [object] is wrong once, not once for each.
+            if place.is_some() && said.contains(&(span.clone(), &problem.message)) {
+                continue;
+            }
+            said.push((span.clone(), &problem.message));
+            let mut labels = Vec::new();
+            if place.is_some() {
+                labels.push(label(&problem.key.to_string(), &span));
+            }
+            for also in &problem.also {
+                if let Some(span) = file.place(*also) {
+                    labels.push(label(&also.to_string(), &span));
                 }
-                for also in &problem.also {
-                    if let Some(span) = file.place(*also) {
-                        labels.push(label(&also.to_string(), &span));
-                    }
-                }
-                let span = span.unwrap_or(0..0);
-                self.located(&span, problem.to_string(), labels, problem.help.clone())
-            })
-            .collect();
+            }
+            let what = problem.to_string();
+            located.push(self.located(&span, what, labels, problem.help.clone()));
+        }
         self.error(located)
     }
 

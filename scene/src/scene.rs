@@ -176,7 +176,7 @@ impl Scene {
             .map(|order| order.first)
     }
 
-    /// The same scenario with its first `robots` homes only.
+    /// The same scenario with its first `robots` homes only, and no certificate.
     ///
     /// # Errors
     /// More robots than homes, or none.
@@ -187,6 +187,8 @@ impl Scene {
         crate::validate::enough_homes(robots, self.homes.len())?;
         let mut draft = (*self.draft).clone();
         draft.homes.truncate(robots);
+        // Its moves may need a robot that is gone.
+        draft.certificate.clear();
         Self::new(draft)
     }
 

@@ -78,6 +78,7 @@ proptest! {
         // Fewer robots make another scenario, which reads back as itself too.
         let fewer = made.with_robots(1).unwrap();
         prop_assert_ne!(fewer.hash, made.hash);
+        prop_assert_eq!(fewer.homes.len(), 1);
         prop_assert_eq!(parse(&to_canonical_toml(&fewer), "fewer").unwrap().hash, fewer.hash);
     }
 }

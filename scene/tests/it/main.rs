@@ -9,4 +9,5 @@ mod cspace;
 mod files;
 mod geometry;
 mod messages;
+mod reach;
 mod shipped;
