@@ -228,15 +228,20 @@ impl PathSearch {
         (whole && self.occupancy.straight_is_free(scene, from, to)).then(|| (to - from).norm())
     }
 
-    /// Writes the path that ends with lattice point `last`; its length, m.
+    /// Writes the path that ends with lattice point `last`; its length, m. The ends stand for
+    /// the lattice points they are on.
     fn trace(&mut self, scene: &Scene, last: u32) -> f64 {
         let lattice = &scene.lattice;
         let (mut straight, mut diagonal) = (0_u32, 0_u32);
         add_corner(&mut self.path, self.to);
         let mut cell = last;
         loop {
-            add_corner(&mut self.path, lattice.at(cell));
             let before = self.frontier.from(cell);
+            let is_end = cell == last && self.ends.is_on_lattice()
+                || before == NOWHERE && self.starts.is_on_lattice();
+            if !is_end {
+                add_corner(&mut self.path, lattice.at(cell));
+            }
             if before == NOWHERE {
                 break;
             }

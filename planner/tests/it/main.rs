@@ -11,7 +11,11 @@ mod hard;
 #[cfg(test)]
 mod obstacles;
 #[cfg(test)]
+mod priority;
+#[cfg(test)]
 mod room;
+#[cfg(test)]
+mod rules;
 #[cfg(test)]
 mod search;
 #[cfg(test)]

@@ -1,13 +1,14 @@
 //! The planner service, step by step.
 
 use planner::{Planner, PlannerInput};
-use scene::{HardMode, Method, Scene, Settings};
+use scene::{Draft, HardMode, Method, ObjectDraft, Scene, Settings, ShapeDraft, WallDraft};
+use shm_types::capacity::MAX_CONSTRAINTS;
 use shm_types::{
     Constraint, ConstraintKind, ConstraintTable, HardAnswer, HardRequest, PlannerReport,
     WorldSnapshot, zeroed,
 };
 
-use crate::room::{checked, put, shipped, start};
+use crate::room::{checked, put, scene_of, shipped, start};
 
 const MUCH: u64 = u64::MAX;
 
@@ -23,7 +24,10 @@ struct Service {
 
 impl Service {
     fn new(name: &str, method: Method, hard: HardMode) -> Self {
-        let scene = shipped(name);
+        Self::of(shipped(name), method, hard)
+    }
+
+    fn of(scene: Scene, method: Method, hard: HardMode) -> Self {
         Self {
             world: start(&scene),
             planner: Planner::new(
@@ -332,4 +336,43 @@ fn the_hash_tells_states_apart() {
         (1..40).all(|tick| first[tick] != first[tick - 1]),
         "work shows every tick"
     );
+}
+
+/// 200 objects one behind the other in a dead end as wide as they are, each grasped from the
+/// side of the exit: each of them blocks all that are behind it.
+fn dead_end() -> Scene {
+    let mut draft = Draft::room("dead end", [0.0, 0.0, 114.5, 10.0]);
+    draft.walls = vec![
+        WallDraft::Box([12.0, 0.0, 114.5, 4.5]),
+        WallDraft::Box([12.0, 5.0, 114.5, 10.0]),
+    ];
+    draft.homes = vec![[11.25, 0.25]];
+    for i in 0..200_u32 {
+        let (column, row) = (f64::from(i % 10), f64::from(i / 10));
+        let start = [14.25 + 0.5 * f64::from(i), 4.75];
+        let goal = [1.25 + column, 0.25 + 0.5 * row];
+        let mut object = ObjectDraft::paper(start, Some(goal));
+        object.shape = ShapeDraft::Box([0.5, 0.5]);
+        object.grasp = [-0.5, 0.0];
+        draft.objects.push(object);
+    }
+    scene_of(draft)
+}
+
+#[test]
+fn a_table_that_is_full_says_how_much_is_missing() {
+    let scene = dead_end();
+    assert_eq!(scene.lattice.pitch_m, 0.5);
+    let mut service = Service::of(scene, Method::Restricted, HardMode::Cached);
+    for task in 0..199 {
+        let answers = service.settle(&[request(0, task + 1, task)], MUCH);
+        assert_eq!(answers[0].found, 199 - task);
+    }
+    let pairs = 200 * 199 / 2;
+    assert_eq!(service.table.count as usize, MAX_CONSTRAINTS);
+    assert_eq!(
+        service.report.constraints_dropped as usize,
+        pairs - MAX_CONSTRAINTS
+    );
+    assert!(service.table.constraints().is_sorted());
 }

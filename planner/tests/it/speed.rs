@@ -8,33 +8,10 @@ use planner::{DistanceField, EasyConstraints, Kind, PathSearch, Places, easy};
 use scene::{Budget, Scene, Vec2};
 use shm_types::Counters;
 
-use crate::room::room;
+use crate::room::shipped;
 use crate::search::run;
 
 const ROUNDS: u32 = 200;
-
-/// About 70 m² with walls that make searches wind.
-fn large() -> Scene {
-    let walls = [
-        [2.0, 0.0, 2.2, 6.0],
-        [4.0, 1.4, 4.2, 7.6],
-        [6.0, 0.0, 6.2, 6.0],
-        [8.0, 1.4, 8.2, 7.6],
-    ];
-    let trips = [
-        ([1.0, 3.0], Some([9.0, 3.0])),
-        ([3.0, 4.0], Some([7.0, 2.0])),
-        ([5.0, 2.0], Some([1.0, 6.0])),
-        ([7.0, 5.0], Some([3.0, 1.5])),
-        ([9.0, 5.0], Some([5.0, 5.0])),
-    ];
-    room(
-        [0.0, 0.0, 9.6, 7.6],
-        &walls,
-        &[[0.4, 0.4], [9.2, 0.4], [0.4, 7.2], [9.2, 7.2]],
-        &trips,
-    )
-}
 
 /// Time this thread has spent on a processor, ns: other load on the machine does not count.
 fn busy_ns() -> u64 {
@@ -53,7 +30,7 @@ fn report(what: &str, count: u64, since: u64) {
 #[test]
 #[ignore = "a measurement"]
 fn speed() {
-    let scene = large();
+    let scene = shipped("paper-68a");
     println!(
         "{} lattice points of {} m",
         scene.lattice.len(),
