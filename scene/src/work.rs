@@ -6,15 +6,19 @@
 //! Terms: one *unit* is one cell expanded by a path search or a flood. The other costs are ratios
 //! of measured times, rounded up to whole units, so that virtual planning time is deterministic
 //! whatever the machine does.
+//!
+//! Measured by the test `speed` of crate `planner` on one core of a 2-core x86-64 machine, in a
+//! room of 68.8 m² at a pitch of 0.05 m: 57 ns for a cell, 14 to 18 ns for a polygon test, 390 ns
+//! for an obstacle, 940 ns for a reset.
 
 /// One test whether two convex bodies overlap, standing or swept. Measured: 10 to 17 ns for a
 /// robot with its object against an object, boxes, where a cell takes 55 ns
 /// (`planner/tests/it/speed.rs`).
 pub const UNITS_PER_POLYGON_TEST: u64 = 1;
 /// One obstacle entered into the configuration space of a body.
-pub const UNITS_PER_OBSTACLE: u64 = 16;
+pub const UNITS_PER_OBSTACLE: u64 = 7;
 /// Setting the configuration space back to the walls.
-pub const UNITS_PER_RESET: u64 = 16;
+pub const UNITS_PER_RESET: u64 = 17;
 
 /// The work units a step may still spend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
