@@ -11,7 +11,7 @@ use scene::{BUILTIN, Scene};
 use crate::exit::{Exit, Failure};
 
 /// The scenario that is run if none is named.
-pub(crate) const DEFAULT: &str = "e1";
+pub(crate) const DEFAULT: &str = "paper-68a";
 
 /// A scenario, and what its file says of where it came from.
 #[derive(Debug)]

@@ -75,6 +75,9 @@ fn rows(result: &RunResult) -> Vec<(&'static str, String)> {
             result.driver
         ),
     )];
+    if result.outcome == Ending::Infeasible {
+        return rows;
+    }
     if let Some(makespan) = result.makespan_s {
         let bound = result.lower_bound_s.map_or_else(String::new, |bound| {
             format!(" (no plan is shorter than {bound:.2} s)")
