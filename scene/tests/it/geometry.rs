@@ -211,3 +211,46 @@ fn a_body_passes_a_gap_of_its_own_width() {
         assert_eq!(meets(above) || meets(below), blocked, "gap {gap}");
     }
 }
+
+#[test]
+fn what_is_no_shape_is_refused_with_its_reason() {
+    use scene::ShapeError;
+    let polygon = |corners: &[[f64; 2]]| {
+        let corners: Vec<_> = corners.iter().map(|[x, y]| Vec2::new(*x, *y)).collect();
+        Shape::polygon(&corners)
+    };
+    let arrow = [[-1.0, -1.0], [1.0, 0.0], [-1.0, 1.0], [-0.5, 0.0]];
+    assert_eq!(polygon(&arrow), Err(ShapeError::NotConvex { corner: 3 }));
+    // The same corner of the same arrow, told clockwise.
+    let mut clockwise = arrow;
+    clockwise.reverse();
+    assert_eq!(
+        polygon(&clockwise),
+        Err(ShapeError::NotConvex { corner: 0 })
+    );
+    // Twice around, each corner convex by itself.
+    let star = [
+        [1.0, 0.0],
+        [-0.8, 0.6],
+        [0.3, -0.95],
+        [0.3, 0.95],
+        [-0.8, -0.6],
+    ];
+    assert!(matches!(polygon(&star), Err(ShapeError::NotConvex { .. })));
+    let straight = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 1.0]];
+    assert_eq!(polygon(&straight), Err(ShapeError::NotConvex { corner: 1 }));
+    let sliver = [[0.0, 0.0], [1.0, 0.0], [0.5, 1e-4]];
+    assert!(matches!(polygon(&sliver), Err(ShapeError::TooSmall { .. })));
+    let circle: Vec<[f64; 2]> = (0..17)
+        .map(|i| f64::from(i) / 17.0 * std::f64::consts::TAU)
+        .map(|angle| [angle.cos(), angle.sin()])
+        .collect();
+    assert_eq!(
+        polygon(&circle),
+        Err(ShapeError::TooManyPoints { points: 17 })
+    );
+    assert!(polygon(&circle[..16]).is_ok());
+    let far = Shape::rectangle(Vec2::new(1.0, 2e5));
+    assert_eq!(far, Err(ShapeError::TooLarge { length_m: 2e5 }));
+    assert_eq!(Shape::circle(f64::NAN), Err(ShapeError::NotFinite));
+}
