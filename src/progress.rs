@@ -1,6 +1,6 @@
 //! What people see while a run goes on: objects done, what each robot does, world time.
 //!
-//! Responsible for: one line on stderr, only where somebody watches it; notes as they come.
+//! Responsible for: one line on stderr, only where somebody watches it.
 //! Not responsible for: the result.
 
 use std::time::Duration;
@@ -49,15 +49,6 @@ impl Progress {
         self.bar.set_message(message(snapshot));
     }
 
-    /// Prints a sentence above the line, or to stderr.
-    pub(crate) fn note(&self, text: &str) {
-        if self.bar.is_hidden() {
-            crate::output::complain(text);
-        } else {
-            self.bar.println(text);
-        }
-    }
-
     /// Takes the line away.
     pub(crate) fn clear(&self) {
         self.bar.finish_and_clear();
@@ -67,10 +58,6 @@ impl Progress {
 impl node::Observer for Progress {
     fn progress(&mut self, snapshot: Checked<'_, WorldSnapshot>) {
         self.show(snapshot);
-    }
-
-    fn note(&mut self, text: &str) {
-        Self::note(self, text);
     }
 }
 

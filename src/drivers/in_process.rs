@@ -11,9 +11,9 @@ use std::time::Instant;
 use node::report::{ActivityReport, WorkReport};
 use node::{Latencies, RunOptions, Timed, WorldReport};
 use scene::Scene;
-use shm_types::{Activity, Checked, Outcome};
+use shm_types::{Activity, Checked, Outcome, WorldSnapshot};
 use sim::{SimReport, Simulation};
-use trace::{Ending, SceneRecord};
+use trace::{CheckReport, Ending, SceneRecord};
 
 use crate::drivers::Finished;
 use crate::drivers::interrupt::Interrupt;
@@ -28,7 +28,7 @@ const RUN_ID: u64 = 0;
 /// Runs `scene` to its end.
 ///
 /// # Errors
-/// A file cannot be made.
+/// A file cannot be made or written.
 pub(crate) fn run(
     scene: &Scene,
     options: &RunOptions,
@@ -36,16 +36,12 @@ pub(crate) fn run(
 ) -> Result<Finished, Failure> {
     let interrupt = Interrupt::watch()
         .map_err(|error| Failure::system(format!("signals cannot be watched: {error}")))?;
-    let record = SceneRecord::new(scene, &options.settings, RUN_ID);
-    let every_ns = (1e9 / options.state_rate_hz) as u64;
-    let mut recording =
-        Recording::start(options.trace.as_deref(), &record, every_ns).map_err(Failure::system)?;
-    let mut hashes = options.hashes.as_deref().map(create).transpose()?;
-
+    let mut files = Files::create(scene, options)?;
     let mut simulation = Simulation::new(scene, &options.settings, RUN_ID);
+    files.add_state(scene, simulation.snapshot())?;
     let mut latency = Latencies::new();
-    let (started, mut shown) = (Instant::now(), Instant::now());
-    let mut before = started;
+    let started = Instant::now();
+    let (mut shown, mut before) = (started, started);
     while simulation.outcome() == Outcome::Running {
         if interrupt.is_asked() {
             simulation.stop();
@@ -53,41 +49,83 @@ pub(crate) fn run(
         simulation.tick();
         let after = Instant::now();
         latency.record(Timed::Tick, (after - before).as_nanos() as u64);
-        let snapshot = Checked::new(simulation.snapshot(), scene.counts())
-            .map_err(|error| Failure::system(format!("a snapshot is invalid: {error}")))?;
-        recording
-            .tick(snapshot, simulation.motion(), after)
-            .map_err(Failure::system)?;
-        if let Some(file) = &mut hashes {
-            writeln!(file, "{:016x}", snapshot.header.state_hash).map_err(unwritten)?;
-        }
+        files.add_tick(scene, &simulation, after)?;
         if after - shown >= PERIOD {
             shown = after;
-            progress.show(snapshot);
+            progress.show(checked(simulation.snapshot(), scene)?);
         }
         before = Instant::now();
     }
     let wall_s = started.elapsed().as_secs_f64();
-    if let Some(file) = &mut hashes {
-        file.flush().map_err(unwritten)?;
-    }
     let report = simulation.report();
-    let roles = vec![RoleLine {
+    let role = RoleLine {
         role: "in-process".to_owned(),
         pid: std::process::id(),
         ticks_answered: report.ticks,
         cpu_s: cpu_s(),
-    }];
-    let check = recording
-        .finish(ending(&report, options))
-        .map_err(Failure::system)?;
+    };
     Ok(Finished {
-        check: Some(check),
+        check: Some(files.finish(ending(&report, options))?),
         wall_s,
         latency,
-        roles,
+        roles: vec![role],
         ..finished(report)
     })
+}
+
+/// What a run writes while it goes on.
+struct Files {
+    recording: Recording,
+    hashes: Option<BufWriter<File>>,
+}
+
+impl Files {
+    fn create(scene: &Scene, options: &RunOptions) -> Result<Self, Failure> {
+        let record = SceneRecord::new(scene, &options.settings, RUN_ID);
+        let every_ns = (1e9 / options.state_rate_hz) as u64;
+        Ok(Self {
+            hashes: options.hashes.as_deref().map(create).transpose()?,
+            recording: Recording::start(options.trace.as_deref(), &record, every_ns)
+                .map_err(Failure::system)?,
+        })
+    }
+
+    fn add_state(&mut self, scene: &Scene, snapshot: &WorldSnapshot) -> Result<(), Failure> {
+        let snapshot = checked(snapshot, scene)?;
+        self.recording.state(snapshot).map_err(Failure::system)
+    }
+
+    fn add_tick(
+        &mut self,
+        scene: &Scene,
+        simulation: &Simulation<'_>,
+        now: Instant,
+    ) -> Result<(), Failure> {
+        self.recording
+            .motion(simulation.motion(), now)
+            .map_err(Failure::system)?;
+        self.add_state(scene, simulation.snapshot())?;
+        if let Some(file) = &mut self.hashes {
+            let hash = simulation.snapshot().header.state_hash;
+            writeln!(file, "{hash:016x}").map_err(unwritten)?;
+        }
+        Ok(())
+    }
+
+    fn finish(self, ending: Ending) -> Result<CheckReport, Failure> {
+        if let Some(mut file) = self.hashes {
+            file.flush().map_err(unwritten)?;
+        }
+        self.recording.finish(ending).map_err(Failure::system)
+    }
+}
+
+fn checked<'a>(
+    snapshot: &'a WorldSnapshot,
+    scene: &Scene,
+) -> Result<Checked<'a, WorldSnapshot>, Failure> {
+    Checked::new(snapshot, scene.counts())
+        .map_err(|error| Failure::system(format!("a snapshot is invalid: {error}")))
 }
 
 /// Processor time of this thread so far, seconds, where the kernel tells.

@@ -63,23 +63,32 @@ impl Recording {
         })
     }
 
-    /// Adds a tick.
+    /// Adds the motion and events of a tick.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub(crate) fn tick(
+    pub(crate) fn motion(
         &mut self,
-        snapshot: Checked<'_, WorldSnapshot>,
         motion: &MotionBatch,
         now: Instant,
     ) -> Result<(), RecordingError> {
         self.writer.batch(motion)?;
-        self.writer.snapshot(snapshot)?;
         if now.duration_since(self.flushed) >= FLUSH_EVERY {
             self.flushed = now;
             self.writer.flush()?;
         }
         Ok(())
+    }
+
+    /// Offers a state: those that are due are kept.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(crate) fn state(
+        &mut self,
+        snapshot: Checked<'_, WorldSnapshot>,
+    ) -> Result<(), RecordingError> {
+        Ok(self.writer.snapshot(snapshot)?)
     }
 
     /// Ends the trace and checks it.
