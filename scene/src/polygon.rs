@@ -62,7 +62,8 @@ impl Polygon {
         Ok(polygon)
     }
 
-    /// Every corner turns left by a real angle, and the turns add up to one round.
+    /// Every corner turns left by a real angle, and the turns add up to one round; else the
+    /// first corner that does not, or the last.
     fn check_convex(points: &[Vec2]) -> Result<(), usize> {
         let count = points.len();
         let mut turned = 0.0;
@@ -75,9 +76,9 @@ impl Polygon {
                 return Err(i);
             }
             turned += turn.atan2(before.dot(&after));
-            if turned > std::f64::consts::TAU + MIN_TURN {
-                return Err(i);
-            }
+        }
+        if turned > std::f64::consts::TAU + MIN_TURN {
+            return Err(count - 1);
         }
         Ok(())
     }
