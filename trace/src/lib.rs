@@ -12,6 +12,7 @@
 mod channel;
 mod check;
 mod fit;
+mod frames;
 mod merge;
 mod reader;
 pub mod record;

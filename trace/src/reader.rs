@@ -1,31 +1,24 @@
 //! Reading a trace, whole or cut short.
 //!
-//! Responsible for: the file's framing, checksums and channels; refusing what is no trace, with
-//! the way out; handing records over span by span.
-//! Not responsible for: whether the run they tell of is a legal one (`check`) or where bodies are
+//! Responsible for: the file's channels; refusing what is no trace, with the way out; handing
+//! records over span by span.
+//! Not responsible for: framing and checksums (`frames`), whether the run they tell of is a legal one (`check`) or where bodies are
 //! between records (`replay`).
 //!
 //! Terms: a *span* is all that lies between two marks. Records behind the last mark are not used:
 //! only a mark says that nothing before it is missing.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::io::{self, Read};
 
 use mcap::McapError;
 use mcap::records::{Record as Raw, op};
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use serde::de::DeserializeOwned;
 
 use crate::channel::{Channel, ENCODING};
 use crate::fit::{self, Unfit};
+use crate::frames::{FrameError, Frames};
 use crate::record::{End, Event, Gap, Mark, Motion, SceneRecord, State};
-
-/// Longest record of a file that is read, bytes. Chunks are about 1 MiB.
-const MAX_RECORD_BYTES: usize = 64 << 20;
-/// Most bytes asked of the source at a time.
-const READ_BYTES: usize = 64 << 10;
-/// Opcode and length in front of each record.
-const FRAME_BYTES: usize = 9;
 
 /// Why a trace cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -370,145 +363,5 @@ fn message(
             ))),
         },
         _ => Ok(None),
-    }
-}
-
-/// Why there is no next record.
-enum FrameError {
-    /// The file ends in the middle of something.
-    Cut,
-    /// It cannot be read.
-    Read(Unreadable),
-}
-
-/// A [`ReadError`] that does not know yet how far the trace read well.
-enum Unreadable {
-    Io(io::Error),
-    Mcap(McapError),
-}
-
-impl Unreadable {
-    fn at(self, after_ns: u64) -> ReadError {
-        match self {
-            Self::Io(error) => ReadError::Io(error),
-            Self::Mcap(McapError::UnsupportedCompression(how)) => ReadError::Compressed(how),
-            Self::Mcap(source) => ReadError::Damaged { after_ns, source },
-        }
-    }
-}
-
-impl From<McapError> for FrameError {
-    fn from(error: McapError) -> Self {
-        match error {
-            McapError::UnexpectedEof => Self::Cut,
-            McapError::Io(error) => Self::Read(Unreadable::Io(error)),
-            error => Self::Read(Unreadable::Mcap(error)),
-        }
-    }
-}
-
-/// The records of an MCAP file, those inside chunks as well. A chunk is handed out only once it is
-/// there as a whole and its checksum is right.
-struct Frames<R> {
-    /// The first bytes, which were looked at, and the rest.
-    source: io::Chain<io::Cursor<Vec<u8>>, R>,
-    reader: LinearReader,
-    /// Records of the newest chunk that are not handed out yet.
-    chunk: VecDeque<(u8, Vec<u8>)>,
-}
-
-impl<R: Read> Frames<R> {
-    fn new(mut source: R) -> Result<Self, ReadError> {
-        let mut head = Vec::new();
-        let magic = mcap::MAGIC;
-        source
-            .by_ref()
-            .take(magic.len() as u64)
-            .read_to_end(&mut head)
-            .map_err(ReadError::Io)?;
-        if head != magic {
-            let cut = !head.is_empty() && magic.starts_with(&head);
-            return Err(if cut {
-                ReadError::TooShort
-            } else {
-                ReadError::Foreign
-            });
-        }
-        let options = LinearReaderOptions::default()
-            .with_emit_chunks(true)
-            .with_validate_data_section_crc(true)
-            .with_validate_summary_section_crc(true)
-            .with_record_length_limit(MAX_RECORD_BYTES);
-        Ok(Self {
-            source: io::Cursor::new(head).chain(source),
-            reader: LinearReader::new_with_options(options),
-            chunk: VecDeque::new(),
-        })
-    }
-
-    fn next(&mut self) -> Result<Option<(u8, Vec<u8>)>, FrameError> {
-        loop {
-            if let Some(record) = self.chunk.pop_front() {
-                return Ok(Some(record));
-            }
-            match self.reader.next_event() {
-                None => return Ok(None),
-                Some(Ok(LinearReadEvent::ReadRequest(bytes))) => self.fill(bytes)?,
-                Some(Ok(LinearReadEvent::Record {
-                    data,
-                    opcode: op::CHUNK,
-                })) => {
-                    unpack(data, &mut self.chunk)?;
-                }
-                Some(Ok(LinearReadEvent::Record { data, opcode })) => {
-                    return Ok(Some((opcode, data.to_vec())));
-                }
-                Some(Err(error)) => return Err(error.into()),
-            }
-        }
-    }
-
-    fn fill(&mut self, bytes: usize) -> Result<(), FrameError> {
-        let space = self.reader.insert(bytes.min(READ_BYTES));
-        loop {
-            match self.source.read(space) {
-                Ok(read) => {
-                    self.reader.notify_read(read);
-                    return Ok(());
-                }
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(FrameError::Read(Unreadable::Io(error))),
-            }
-        }
-    }
-}
-
-/// Checks a chunk and cuts it into its records.
-fn unpack(chunk: &[u8], records: &mut VecDeque<(u8, Vec<u8>)>) -> Result<(), McapError> {
-    let Raw::Chunk { header, data } = mcap::parse_record(op::CHUNK, chunk)? else {
-        return Ok(());
-    };
-    if !header.compression.is_empty() {
-        return Err(McapError::UnsupportedCompression(header.compression));
-    }
-    let (saved, calculated) = (header.uncompressed_crc, crc32fast::hash(&data));
-    if saved != 0 && saved != calculated {
-        return Err(McapError::BadChunkCrc { saved, calculated });
-    }
-    let mut rest = &data[..];
-    while let Some((frame, body)) = rest.split_at_checked(FRAME_BYTES) {
-        let mut length = [0; 8];
-        length.copy_from_slice(&frame[1..]);
-        let length = usize::try_from(u64::from_le_bytes(length)).unwrap_or(usize::MAX);
-        let Some((body, behind)) = body.split_at_checked(length) else {
-            return Err(McapError::UnexpectedEoc);
-        };
-        records.push_back((frame[0], body.to_vec()));
-        rest = behind;
-    }
-    if rest.is_empty() {
-        Ok(())
-    } else {
-        Err(McapError::UnexpectedEoc)
     }
 }

@@ -1,6 +1,8 @@
 //! Traces as files: written from the messages of a run, read back whole, cut short, damaged, made
 //! up.
 
+#![expect(clippy::unwrap_used, reason = "a test may fail")]
+
 use std::io::Cursor;
 
 use proptest::prelude::*;

@@ -9,15 +9,14 @@
 //! over the time they share that was not tested before. So each two pieces are tested once, by
 //! whichever ends first.
 
-use std::collections::BTreeMap;
-
 use nalgebra::Vector2;
 
-use super::geometry::{Interval, Meeting, Solid, Vector};
+use super::geometry::Vector;
 use super::grid::{Grid, Region};
+use super::pairs::{Pair, Pairs, Shape, report};
 use super::report::{Findings, Kind, Who};
 use super::rules::{Apart, OVERLAP_M, Rules};
-use crate::record::{BodyKind, Motion, Outline, SceneRecord, State};
+use crate::record::{BodyKind, Motion, SceneRecord, State};
 
 /// Two places nearer than this are the same, m: the micrometre within which a grasp is good, the
 /// micrometre by which it may put its object right, nothing more.
@@ -51,67 +50,30 @@ impl Line {
 #[derive(Clone, Copy, Debug)]
 struct Body {
     who: Who,
-    shape: usize,
+    shape: Shape,
     line: Line,
     /// Up to when it has been tested, ns.
     settled_ns: u64,
-}
-
-/// All shapes, each once, and where any two of them meet.
-#[derive(Default)]
-struct Shapes {
-    outlines: Vec<Outline>,
-    solids: Vec<Solid>,
-    meetings: BTreeMap<(usize, usize), Meeting>,
-}
-
-impl Shapes {
-    fn add(&mut self, outline: &Outline) -> usize {
-        if let Some(known) = self.outlines.iter().position(|other| other == outline) {
-            return known;
-        }
-        self.outlines.push(outline.clone());
-        self.solids.push(outline.into());
-        self.solids.len() - 1
-    }
-
-    fn meeting(&mut self, moving: usize, standing: usize) -> &Meeting {
-        let solids = &self.solids;
-        self.meetings
-            .entry((moving, standing))
-            .or_insert_with(|| Meeting::of(&solids[moving], &solids[standing]))
-    }
-}
-
-/// Two bodies, or a body and a wall, over a span of time in which both go straight.
-struct Pair {
-    who: (Who, Who),
-    shapes: (usize, usize),
-    /// Place of the first relative to the second, at the start and at the end.
-    from: Vector,
-    to: Vector,
-    span_ns: (u64, u64),
 }
 
 /// All bodies of a run.
 pub(super) struct Bodies {
     bodies: Vec<Body>,
     robots: usize,
-    shapes: Shapes,
-    walls: Vec<(usize, Vector)>,
+    pairs: Pairs,
+    walls: Vec<(Shape, Vector)>,
     grid: Grid,
     wall_grid: Grid,
     bounds: Region,
     clearance_m: f64,
-    tests: u64,
     found: Vec<usize>,
 }
 
 impl Bodies {
     /// All at their starts, time 0.
     pub(super) fn new(scene: &SceneRecord) -> Self {
-        let mut shapes = Shapes::default();
-        let robot = shapes.add(&scene.robot.shape);
+        let mut pairs = Pairs::new(scene.robot.clearance_m);
+        let robot = pairs.add(&scene.robot.shape);
         let robots = scene
             .homes
             .iter()
@@ -119,36 +81,35 @@ impl Bodies {
             .map(|(id, home)| (Who::Robot(id), robot, *home));
         let mut placed: Vec<_> = robots.collect();
         for (id, object) in scene.objects.iter().enumerate() {
-            placed.push((Who::Object(id), shapes.add(&object.shape), object.start));
+            placed.push((Who::Object(id), pairs.add(&object.shape), object.start));
         }
-        let walls: Vec<(usize, Vector)> = scene
+        let walls: Vec<(Shape, Vector)> = scene
             .walls
             .iter()
-            .map(|wall| (shapes.add(&wall.shape), wall.at.into()))
+            .map(|wall| (pairs.add(&wall.shape), wall.at.into()))
             .collect();
         let bounds = Region {
             low: scene.low.into(),
             high: scene.high.into(),
         };
         let widths = placed.iter().map(|&(_, shape, _)| {
-            let (low, high) = shapes.solids[shape].extent();
+            let (low, high) = pairs.extent(shape);
             (high - low).max()
         });
         let cell_m = widths.fold(0.0, f64::max);
         let mut wall_grid = Grid::new(bounds, walls.len(), cell_m);
         for (id, &(shape, at)) in walls.iter().enumerate() {
-            wall_grid.put(id, Region::swept(shapes.solids[shape].extent(), at, at));
+            wall_grid.put(id, Region::swept(pairs.extent(shape), at, at));
         }
         let mut all = Self {
             grid: Grid::new(bounds, placed.len(), cell_m),
             bodies: Vec::new(),
             robots: scene.homes.len(),
-            shapes,
+            pairs,
             walls,
             wall_grid,
             bounds,
             clearance_m: scene.robot.clearance_m,
-            tests: 0,
             found: Vec::new(),
         };
         for (id, (who, shape, at)) in placed.into_iter().enumerate() {
@@ -166,7 +127,7 @@ impl Bodies {
 
     /// Exact tests so far.
     pub(super) const fn tests(&self) -> u64 {
-        self.tests
+        self.pairs.tests()
     }
 
     fn index(&self, who: Who) -> usize {
@@ -215,10 +176,8 @@ impl Bodies {
     fn put(&mut self, id: usize) {
         let body = &self.bodies[id];
         let (from, to) = body.line.ends();
-        self.grid.put(
-            id,
-            Region::swept(self.shapes.solids[body.shape].extent(), from, to),
-        );
+        self.grid
+            .put(id, Region::swept(self.pairs.extent(body.shape), from, to));
     }
 
     /// Forgets all that was and takes every place from a state record.
@@ -270,7 +229,7 @@ impl Bodies {
         if !goes_on {
             return;
         }
-        let extent = self.shapes.solids[shape].extent();
+        let extent = self.pairs.extent(shape);
         let region =
             Region::swept(extent, line.at(settled_ns), line.at(time_ns)).grown(self.clearance_m);
         let mut found = std::mem::take(&mut self.found);
@@ -291,7 +250,8 @@ impl Bodies {
                     span_ns: (since_ns, time_ns),
                 };
                 let moving = is_moving(&line) || is_moving(&other.line);
-                self.test(&pair, rules.apart(who, pair.who.1, moving), findings);
+                self.pairs
+                    .test(&pair, rules.apart(who, pair.who.1, moving), findings);
             }
         }
         found.clear();
@@ -311,28 +271,11 @@ impl Bodies {
                 to: line.at(time_ns) - at,
                 span_ns: (settled_ns, time_ns),
             };
-            self.test(&pair, apart, findings);
+            self.pairs.test(&pair, apart, findings);
         }
         self.found = found;
         self.test_bounds(id, time_ns, apart, findings);
         self.bodies[id].settled_ns = time_ns;
-    }
-
-    fn test(&mut self, pair: &Pair, apart: Apart, findings: &mut Findings) {
-        if apart == Apart::Free {
-            return;
-        }
-        self.tests += 1;
-        let clearance_m = self.clearance_m;
-        let meeting = self.shapes.meeting(pair.shapes.0, pair.shapes.1);
-        if let Some(when) = meeting.nearer_than(-OVERLAP_M, pair.from, pair.to) {
-            report(findings, Kind::Collision, pair, when, clearance_m);
-        } else if apart == Apart::Clearance
-            && clearance_m > 0.0
-            && let Some(when) = meeting.nearer_than(clearance_m - OVERLAP_M, pair.from, pair.to)
-        {
-            report(findings, Kind::Clearance, pair, when, clearance_m);
-        }
     }
 
     /// The bounds are straight, so a body leaves them on its way only if it is outside at an end.
@@ -343,7 +286,7 @@ impl Bodies {
             shape,
             who,
         } = self.bodies[id];
-        let (low, high) = self.shapes.solids[shape].extent();
+        let (low, high) = self.pairs.extent(shape);
         let beyond = |time_ns| {
             let at = line.at(time_ns);
             (self.bounds.low - (at + low))
@@ -403,7 +346,7 @@ impl Bodies {
         } else {
             return (false, false);
         };
-        let meeting = self.shapes.meeting(a.shape, b.shape);
+        let meeting = self.pairs.meeting(a.shape, b.shape);
         let was = meeting.nearer_than(distance, from, to).is_some();
         (was, meeting.nearer_than(distance, to, to).is_some())
     }
@@ -419,19 +362,4 @@ pub(super) fn body_of(motion: &Motion) -> Who {
         BodyKind::Robot => Who::Robot(motion.id),
         BodyKind::Object => Who::Object(motion.id),
     }
-}
-
-fn report(findings: &mut Findings, kind: Kind, pair: &Pair, when: Interval, clearance_m: f64) {
-    let (start_ns, end_ns) = pair.span_ns;
-    // Casts of durations, exact far beyond any run's length.
-    let time = |part: f64| start_ns.saturating_add(((end_ns - start_ns) as f64 * part) as u64);
-    let (a, b) = pair.who;
-    let (a, b) = if a <= b { (a, b) } else { (b, a) };
-    findings.lasting(kind, (time(when.0), time(when.1)), (a, b), || {
-        match (kind, b) {
-            (Kind::Collision, Who::Bounds) => format!("{a} is partly beyond {b}"),
-            (Kind::Collision, _) => format!("{a} and {b} overlap"),
-            _ => format!("{a} is nearer to {b} than the clearance of {clearance_m} m"),
-        }
-    });
 }

@@ -1,17 +1,18 @@
 //! The order of things: motion and events of a trace, one after the other, each held against what
 //! was so far.
 //!
-//! Responsible for: order of time, continuity, speed, gaps, how the run ends.
-//! Not responsible for: what an event means (`events`), collisions (`bodies`).
+//! Responsible for: order of time, continuity, speed, rigidity, states.
+//! Not responsible for: what an event means (`events`), collisions (`bodies`), gaps (`gap`), how
+//! the run ends (`ending`).
 
 use nalgebra::Vector2;
 
 use super::bodies::{Bodies, SAME_PLACE_M, body_of};
 use super::events::{Context, Events, off_grasp_m};
-use super::report::{CheckReport, Findings, Kind, Who};
+use super::report::{Findings, Kind, Who};
 use super::rules::Rules;
 use crate::reader::{Close, Span};
-use crate::record::{Event, Gap, Mark, Motion, Outcome, SceneRecord, State};
+use crate::record::{End, Event, Mark, Motion, SceneRecord, State};
 
 /// What may be added to the way a body can go in a piece of motion, m: what rounding the ends of
 /// a piece to a nanosecond and joining pieces may add.
@@ -40,21 +41,21 @@ impl Entry<'_> {
 
 /// Replays a trace.
 pub(super) struct Checker {
-    scene: SceneRecord,
-    bodies: Bodies,
-    rules: Rules,
-    events: Events,
-    findings: Findings,
-    last: Mark,
+    pub(super) scene: SceneRecord,
+    pub(super) bodies: Bodies,
+    pub(super) rules: Rules,
+    pub(super) events: Events,
+    pub(super) findings: Findings,
+    pub(super) last: Mark,
     /// Time and tick of the newest event, in the order of the file.
-    last_event: (u64, u64),
+    pub(super) last_event: (u64, u64),
     /// Versions of the newest state: tick, epoch, constraints.
-    last_state: (u64, u64, u32),
+    pub(super) last_state: (u64, u64, u32),
     /// Batches are missing: nothing is known until a state of this tick or later.
-    lost_until: Option<u64>,
-    missing_batches: u64,
-    last_motion: Option<(u64, Who)>,
-    end: Option<crate::record::End>,
+    pub(super) lost_until: Option<u64>,
+    pub(super) missing_batches: u64,
+    pub(super) last_motion: Option<(u64, Who)>,
+    pub(super) end: Option<End>,
 }
 
 impl Checker {
@@ -185,7 +186,7 @@ impl Checker {
     }
 
     /// Tests everything up to the last mark, unless where things are is unknown.
-    fn settle_all(&mut self) {
+    pub(super) fn settle_all(&mut self) {
         if self.lost_until.is_some() {
             return;
         }
@@ -318,121 +319,6 @@ impl Checker {
             if !same {
                 findings.add(Kind::State, state.time_ns, &[who], || {
                     format!("a state shows other claims or holds of {who} than its events")
-                });
-            }
-        }
-    }
-
-    /// Batches are missing from here on: what was so far is tested, the rest unknown.
-    fn lose(&mut self, gap: Gap) {
-        self.settle_all();
-        self.missing_batches = self.missing_batches.saturating_add(gap.batches);
-        self.lost_until = Some(gap.before_tick.saturating_sub(1));
-    }
-
-    /// Goes on after a gap from the first state that shows what came of it, and drops what is
-    /// older. Says whether there is one.
-    fn resume(&mut self, span: &mut Span, tick: u64) -> bool {
-        let Some(first) = span.states.iter().position(|state| state.tick >= tick) else {
-            return false;
-        };
-        let state = span.states[first].clone();
-        self.lost_until = None;
-        self.bodies.resume(&state);
-        self.rules.resume(&state);
-        self.last_state = (state.tick, state.epoch, state.constraints_version);
-        self.events.epoch = self.events.epoch.max(state.epoch);
-        for robot in 0..self.rules.hands.len() {
-            for object in 0..self.rules.holders.len() {
-                let (_, is_near) = self
-                    .bodies
-                    .nearness(robot, object, state.time_ns, &self.rules);
-                if is_near {
-                    self.rules.leave(robot, object, true);
-                }
-            }
-        }
-        span.states.retain(|other| other.tick > state.tick);
-        span.events.retain(|event| event.tick > state.tick);
-        span.motions.retain_mut(|motion| {
-            if motion.start_ns < state.time_ns {
-                motion.from = motion.at(state.time_ns).into();
-                motion.start_ns = state.time_ns;
-            }
-            motion.start_ns < motion.end_ns
-        });
-        true
-    }
-
-    /// The end of the trace; `has_ended` if it has an `end` record.
-    pub(super) fn finish(mut self, has_ended: bool) -> CheckReport {
-        self.settle_all();
-        if self.lost_until.is_none() {
-            self.test_end();
-        }
-        let is_told_whole = self.end.as_ref().is_some_and(|end| end.complete);
-        let (violations, unlisted_violations) = self.findings.into_sorted();
-        CheckReport {
-            violations,
-            unlisted_violations,
-            swept_tests: self.bodies.tests(),
-            complete: is_told_whole && self.missing_batches == 0,
-            truncated: !has_ended,
-            missing_batches: self.missing_batches,
-            checked_until_ns: self.last.time_ns,
-            outcome: self.end.map(|end| end.outcome),
-        }
-    }
-
-    fn test_end(&mut self) {
-        let Some(end) = &self.end else {
-            return;
-        };
-        let (outcome, makespan_ns) = (end.outcome, end.makespan_ns);
-        if let Some((time_ns, told)) = self.events.ended
-            && (told, time_ns) != (outcome, makespan_ns)
-        {
-            self.findings.add(Kind::Final, time_ns, &[], || {
-                format!(
-                    "the run ended as {told:?} at {:.3} s, but the end record says {outcome:?} at {:.3} s",
-                    time_ns as f64 / 1e9,
-                    makespan_ns as f64 / 1e9
-                )
-            });
-        }
-        if let Some((end_ns, who)) = self.last_motion.filter(|&(end_ns, _)| end_ns > makespan_ns) {
-            self.findings.add(Kind::Final, end_ns, &[who], || {
-                format!("{who} moves after the run's end")
-            });
-        }
-        if outcome == Outcome::Solved {
-            self.test_solved(makespan_ns);
-        }
-    }
-
-    fn test_solved(&mut self, time_ns: u64) {
-        let is_off = |who, place| {
-            (self.bodies.at(who, u64::MAX) - Vector2::from(place)).norm() > SAME_PLACE_M
-        };
-        for (id, home) in self.scene.homes.iter().enumerate() {
-            let who = Who::Robot(id);
-            if is_off(who, *home) {
-                self.findings.add(Kind::Final, time_ns, &[who], || {
-                    format!("{who} does not end at home")
-                });
-            }
-            if let Some(held) = self.rules.hands[id].holding {
-                self.findings
-                    .add(Kind::Final, time_ns, &[who, Who::Object(held)], || {
-                        format!("{who} ends with object {held} in its hand")
-                    });
-            }
-        }
-        for (id, object) in self.scene.objects.iter().enumerate() {
-            let who = Who::Object(id);
-            if object.goal.is_some_and(|goal| is_off(who, goal)) {
-                self.findings.add(Kind::Final, time_ns, &[who], || {
-                    format!("{who} does not end at its goal")
                 });
             }
         }

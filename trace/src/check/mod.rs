@@ -9,11 +9,14 @@
 
 mod bodies;
 mod checker;
+mod ending;
 mod events;
+mod gap;
 mod geometry;
 #[cfg(test)]
 mod geometry_tests;
 mod grid;
+mod pairs;
 mod report;
 mod rules;
 #[cfg(test)]
