@@ -39,8 +39,11 @@ pub struct EasyConstraints {
     places: PlaceBook,
     /// Bit `k` at `one · tasks + two`: constraint `Kind::EASY[k]` holds.
     found: Vec<u8>,
-    /// Tasks whose results are out of date.
+    /// Tasks whose results are out of date, and the same as a list.
     stale: Vec<bool>,
+    stale_list: Vec<usize>,
+    /// Open tasks.
+    open: u64,
     row: usize,
     meter: Meter,
 }
@@ -54,7 +57,9 @@ impl EasyConstraints {
             tasks,
             places: PlaceBook::new(scene),
             found: vec![0; tasks * tasks],
-            stale: vec![true; tasks],
+            stale: vec![false; tasks],
+            stale_list: Vec::with_capacity(tasks),
+            open: 0,
             row: 0,
             meter: Meter::default(),
         }
@@ -65,8 +70,12 @@ impl EasyConstraints {
     pub fn begin(&mut self, places: impl Iterator<Item = Option<Places>>) {
         self.places.update(places);
         for &task in self.places.changed() {
-            self.stale[task] = true;
+            if !self.stale[task] {
+                self.stale[task] = true;
+                self.stale_list.push(task);
+            }
         }
+        self.open = self.places.open().count() as u64;
         self.row = 0;
         self.meter.reset();
     }
@@ -88,6 +97,7 @@ impl EasyConstraints {
             self.row += 1;
             if self.row == self.tasks {
                 self.stale.fill(false);
+                self.stale_list.clear();
             }
         }
         Poll::Pending
@@ -97,10 +107,13 @@ impl EasyConstraints {
     /// to be completed first, and what later. By pairs, in ascending order.
     pub fn for_each(&self, mut found: impl FnMut(Kind, usize, usize)) {
         for (one, _) in self.places.open() {
-            for (two, _) in self.places.open() {
-                let bits = self.found[one * self.tasks + two];
+            let row = &self.found[one * self.tasks..(one + 1) * self.tasks];
+            for (two, bits) in row.iter().enumerate().filter(|(_, bits)| **bits != 0) {
+                if self.places.get(two).is_none() {
+                    continue;
+                }
                 for (bit, kind) in Kind::EASY.into_iter().enumerate() {
-                    if one != two && bits >> bit & 1 == 1 {
+                    if bits >> bit & 1 == 1 {
                         let (before, after) = kind.edge(one, two);
                         found(kind, before, after);
                     }
@@ -115,22 +128,26 @@ impl EasyConstraints {
         let Some(places) = self.places.get(one) else {
             return 0;
         };
-        let mut tests = 0;
-        for (two, other) in self.places.open() {
-            if two == one {
-                continue;
+        if self.stale[one] {
+            for two in 0..self.tasks {
+                self.test(scene, (one, places), two);
             }
-            tests += Kind::EASY.len() as u64;
-            if !self.stale[one] && !self.stale[two] {
-                continue;
+        } else {
+            for index in 0..self.stale_list.len() {
+                self.test(scene, (one, places), self.stale_list[index]);
             }
-            let mut bits = 0;
-            for (bit, kind) in Kind::EASY.into_iter().enumerate() {
-                let holds = holds(scene, kind, (one, places), (two, other));
-                bits |= u8::from(holds) << bit;
-            }
-            self.found[one * self.tasks + two] = bits;
         }
-        tests
+        (self.open - 1) * Kind::EASY.len() as u64
+    }
+
+    fn test(&mut self, scene: &Scene, one: (usize, Places), two: usize) {
+        let Some(places) = self.places.get(two).filter(|_| two != one.0) else {
+            return;
+        };
+        let mut bits = 0;
+        for (bit, kind) in Kind::EASY.into_iter().enumerate() {
+            bits |= u8::from(holds(scene, kind, one, (two, places))) << bit;
+        }
+        self.found[one.0 * self.tasks + two] = bits;
     }
 }

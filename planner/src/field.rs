@@ -101,11 +101,11 @@ impl DistanceField {
         })
     }
 
-    /// Keeps the flood's distances, one path cost a lattice point, for
-    /// [`DistanceField::kept_distance`].
+    /// Keeps the flood's distances for [`DistanceField::kept_distance`]: of each lattice point
+    /// the path cost plus one, 0 where no path leads.
     pub(crate) fn keep(&self, costs: &mut [u32]) {
         for (cell, cost) in costs.iter_mut().enumerate() {
-            *cost = self.frontier.cost(cell as u32).unwrap_or(u32::MAX);
+            *cost = self.frontier.cost(cell as u32).map_or(0, |cost| cost + 1);
         }
     }
 
@@ -119,7 +119,7 @@ impl DistanceField {
         to: Vec2,
     ) -> Option<f64> {
         joined_distance(scene, &self.occupancy, &mut self.joints, from, to, |cell| {
-            Some(costs[cell as usize]).filter(|&cost| cost != u32::MAX)
+            costs[cell as usize].checked_sub(1)
         })
     }
 }

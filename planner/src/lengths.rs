@@ -63,7 +63,7 @@ pub(crate) struct Lengths {
     transfers: Vec<Option<(Places, f64)>>,
     /// Grasp each kept field was flooded from.
     flooded: Vec<Option<Vec2>>,
-    /// Kept fields, one after the other.
+    /// Kept fields, one after the other. All zero until used, so memory is taken as it is needed.
     kept: Vec<u32>,
     /// Transit, robots within tasks, m; infinite if there is none.
     transits: Vec<f64>,
@@ -101,7 +101,7 @@ impl Lengths {
             field: DistanceField::new(scene),
             transfers: vec![None; tasks],
             flooded: vec![None; tasks],
-            kept: vec![u32::MAX; kept],
+            kept: vec![0; kept],
             transits: vec![0.0; tasks * robots],
             stage: Stage::Ready,
             meter: Meter::default(),
