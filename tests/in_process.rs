@@ -159,6 +159,31 @@ fn methods_finish_what_they_can_see() {
     }
 }
 
+/// The six rooms of the paper's sizes: its method finishes each with any number of robots, and
+/// without constraints every one of them sees a task fail.
+#[test]
+fn the_papers_method_finishes_the_papers_rooms() {
+    let rooms: Vec<_> = BUILTIN
+        .iter()
+        .filter(|scenario| scenario.name.starts_with("paper-"))
+        .collect();
+    assert_eq!(rooms.len(), 6);
+    for room in rooms {
+        for scene in with_each_number_of_robots(&parse(room.name, room.text)) {
+            let who = format!("{} × {}", room.name, scene.homes.len());
+            let papers = run(&scene, &with(Method::GraspingAndRestricted));
+            assert_eq!(
+                papers.outcome,
+                Outcome::Solved,
+                "{who}: {:?}",
+                papers.reason
+            );
+            let none = run(&scene, &with(Method::NoAction));
+            assert!(none.world.task_failures > 0, "{who}");
+        }
+    }
+}
+
 #[test]
 fn a_swap_is_a_cycle_of_tasks_and_the_reason_says_so() {
     let report = run(&shipped("swap"), &with(Method::GraspingAndRestricted));

@@ -7,7 +7,6 @@
 
 use std::task::Poll;
 
-use planner::Selection;
 use shm_types::{Claim, NONE, StateHash};
 
 use crate::account::{Doing, Thinking};

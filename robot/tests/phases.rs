@@ -1,5 +1,6 @@
 //! One robot against hand-made snapshots: what it says, tick by tick, when it is blocked, has
 //! failed, is called, carries or is started again (rules 19–22, 24).
+#![expect(clippy::unwrap_used, reason = "a test may fail")]
 
 use robot::{Robot, RobotInput};
 use scene::{Method, Scene, Settings, point, vec};
