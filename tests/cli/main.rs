@@ -1,9 +1,6 @@
 //! The command line as a user meets it: every exit status, every message, every output.
 
-#![expect(
-    clippy::unwrap_used,
-    reason = "a test that cannot go on has failed"
-)]
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod bad_input;
 mod processes;
