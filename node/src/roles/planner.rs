@@ -12,6 +12,7 @@ use planner::{Planner, PlannerInput};
 use shm_types::{
     Checked, ConstraintTable, Counters, HardAnswer, HardRequest, PlannerReport, WorldSnapshot,
 };
+use world::FIRST_INCARNATION;
 
 use crate::calls::{OPEN_CALLS, Question, Server};
 use crate::clock;
@@ -113,7 +114,11 @@ impl Shell {
             self.questions.retain(|held| !asks(held));
         }
         self.counters = output.report.counters;
-        self.outlet.send(|out| *out = output.report)?;
+        let report = PlannerReport {
+            incarnation: FIRST_INCARNATION,
+            ..output.report
+        };
+        self.outlet.send(|out| *out = report)?;
         if let Some(waker) = &self.waker {
             waker.wake()?;
         }

@@ -47,6 +47,7 @@ pub fn main(run_dir: &Path) -> Result<(), RoleError> {
     shell.publish()?;
     if shell.wait_for_all(&seat)? {
         shell.start_ticker(&seat);
+        shell.published_ns = clock::now_ns();
         shell.run(&mut seat)?;
     }
     shell.linger(&seat)?;
