@@ -172,3 +172,60 @@ fn run_in_process(workload: &Workload<'_>) -> Run {
         moving: moving.sum(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene() -> Scene {
+        let e1 = scene::builtin("e1").unwrap();
+        scene::parse(e1.text, e1.name).unwrap()
+    }
+
+    #[test]
+    fn runs_are_repeated_until_there_are_enough_ticks() {
+        let (scene, settings) = (scene(), Settings::default());
+        let workload = Workload {
+            scene: &scene,
+            settings: &settings,
+            ticks: 250,
+        };
+        let one = Run {
+            ticks: 100,
+            world_s: 1.0,
+            wall_s: 0.25,
+            moving: 50,
+        };
+        let speed = lockstep(&workload, 5, || Ok::<_, ()>(one)).unwrap();
+        assert_eq!((speed.runs, speed.ticks, speed.processes), (3, 300, 5));
+        assert_eq!((speed.ratio, speed.us_per_tick), (4.0, 2_500.0));
+        assert_eq!(speed.moving_robots, 0.5);
+    }
+
+    #[test]
+    fn a_run_that_fails_ends_the_measurement() {
+        let (scene, settings) = (scene(), Settings::default());
+        let workload = Workload {
+            scene: &scene,
+            settings: &settings,
+            ticks: 1,
+        };
+        assert_eq!(lockstep(&workload, 5, || Err("lost")), Err("lost"));
+    }
+
+    #[test]
+    fn in_process_counts_world_time_and_motion() {
+        let (scene, settings) = (scene(), Settings::default());
+        let workload = Workload {
+            scene: &scene,
+            settings: &settings,
+            ticks: 1,
+        };
+        let speed = in_process(&workload);
+        assert_eq!(speed.runs, 1);
+        assert!((speed.world_s - speed.ticks as f64 * 0.01).abs() < 1e-9);
+        assert!(speed.moving_robots > 0.0 && speed.moving_robots <= 2.0);
+        let report = Report::new(&workload, vec![speed]);
+        assert_eq!((report.robots, report.objects), (2, 2));
+    }
+}

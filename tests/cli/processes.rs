@@ -151,3 +151,22 @@ fn a_directory_of_runs_that_is_not_private_is_refused() {
     let assert = in_place(place.path(), &["run", "e1"]).assert().code(7);
     says(&stderr(&assert), &["rearrange"]);
 }
+
+#[test]
+fn bench_speed_measures_both_drivers_on_the_same_ticks() {
+    let place = place();
+    let arguments = ["bench", "speed", "e1", "--ticks", "1", "--json"];
+    let report = json(&in_place(place.path(), &arguments).assert().code(0));
+    let rows = report["rows"].as_array().unwrap();
+    let drivers: Vec<_> = rows.iter().map(|row| &row["driver"]).collect();
+    assert_eq!(drivers, ["in-process", "lockstep"]);
+    assert_eq!(rows[0]["ticks"], rows[1]["ticks"]);
+    assert_eq!(rows[1]["processes"], 5);
+    for row in rows {
+        assert!(row["ratio"].as_f64().unwrap() > 0.0);
+        assert!(row["moving_robots"].as_f64().unwrap() > 0.0);
+    }
+    assert!(report["machine"]["cores"].as_u64().unwrap() >= 1);
+    let says_when = report["date"].as_str().unwrap();
+    assert_eq!(says_when.len(), "2007-04-10T09:30:00Z".len());
+}
