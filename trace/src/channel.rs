@@ -73,3 +73,22 @@ impl Channel {
         (format!("{PROFILE}.{}", self.topic()), schema)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Viewers take a channel's schema for the shape of a table: it must describe an object.
+    #[test]
+    fn every_channel_has_a_name_of_its_own_and_a_schema_of_an_object() {
+        for channel in Channel::ALL {
+            assert_eq!(Channel::of_topic(channel.topic()), Some(channel));
+            let (name, schema) = channel.schema();
+            assert_eq!(name, format!("rearrange.{}", channel.topic()));
+            let schema = schema.to_value();
+            assert_eq!(schema["type"], "object", "{name}");
+            assert!(schema["properties"].is_object(), "{name}");
+        }
+        assert_eq!(Channel::of_topic("camera"), None);
+    }
+}

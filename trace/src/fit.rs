@@ -18,7 +18,7 @@ const MAX_LENGTH_M: f64 = 1e6;
 /// Most corners of one shape.
 const MAX_POINTS: usize = 256;
 /// Most walls.
-const MAX_WALLS: usize = 65_536;
+const MAX_WALLS: usize = 4_096;
 
 /// Why a record cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

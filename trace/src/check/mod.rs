@@ -13,14 +13,10 @@ mod ending;
 mod events;
 mod gap;
 mod geometry;
-#[cfg(test)]
-mod geometry_tests;
 mod grid;
 mod pairs;
 mod report;
 mod rules;
-#[cfg(test)]
-mod story;
 #[cfg(test)]
 mod tests;
 

@@ -4,8 +4,8 @@
 use proptest::prelude::*;
 use scene::{Shape, Vec2};
 
-use super::geometry::{Meeting, Solid};
-use super::rules::OVERLAP_M;
+use crate::check::geometry::{Meeting, Solid};
+use crate::check::rules::OVERLAP_M;
 
 /// What the two may differ by, m: the shapes' corners are rounded differently.
 const DIFFERENCE_M: f64 = 1e-7;

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector2;
 
-use super::checker::Checker;
-use super::report::{CheckReport, Kind, Violation};
+use crate::check::checker::Checker;
+use crate::check::report::{CheckReport, Kind, Violation};
 use crate::reader::{Close, Span};
 use crate::record::{
     Activity, BodyKind, End, Event, FORMAT, Happening, Mark, Motion, Object, ObjectNow, Outcome,
