@@ -7,7 +7,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use scene::{HardMode, Method, Scene, Settings, builtin};
-use shm_types::Outcome;
+use shm_types::{Activity, Outcome};
 use sim::Simulation;
 
 /// Counts what a thread asks for while its count is on.
@@ -117,6 +117,24 @@ fn complete_runs_allocate_nothing() {
             method != Method::All,
             "{method}"
         );
+    }
+}
+
+#[test]
+fn four_robots_in_each_others_way_allocate_nothing() {
+    let scene = scene("paper-17a");
+    for &method in Method::ALL {
+        let settings = Settings {
+            method,
+            ..Settings::default()
+        };
+        let report = run(&scene, &settings);
+        assert_eq!(report.robots.len(), 4);
+        let waiting = report
+            .robots
+            .iter()
+            .map(|robot| robot.times.ticks(Activity::Waiting));
+        assert!(waiting.sum::<u64>() > 100, "{method}");
     }
 }
 
