@@ -24,6 +24,8 @@ pub struct RoleReport {
     pub ticks_answered: u64,
     /// Processor time it used, user and system, seconds.
     pub cpu_s: f64,
+    /// Wall time from its first answer to its last, seconds.
+    pub wall_s: f64,
     /// Real time: periods it was too late for, and skipped.
     pub deadline_misses: u64,
     /// Messages it knows it lost: for the world commands that never arrived or were invalid, for
@@ -188,6 +190,7 @@ impl RoleReport {
             pid,
             ticks_answered: 0,
             cpu_s: 0.0,
+            wall_s: 0.0,
             deadline_misses: 0,
             lost: 0,
             counters: WorkReport {

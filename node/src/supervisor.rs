@@ -153,7 +153,6 @@ struct Run<'p> {
     requests: u64,
     restarts: u64,
     notes: Vec<String>,
-    started: Instant,
     oversubscribed: bool,
 }
 
@@ -194,7 +193,6 @@ impl<'p> Run<'p> {
             requests: 0,
             restarts: 0,
             notes: Vec::new(),
-            started: Instant::now(),
             oversubscribed: options::processes(counts) > cores,
             file,
         })
@@ -210,7 +208,6 @@ impl<'p> Run<'p> {
                 self.watch.look()?;
                 if self.watch.all_are_ready() {
                     self.watch.set_up_is_over();
-                    self.started = Instant::now();
                     return Ok(None);
                 }
                 if self.signals.take() {

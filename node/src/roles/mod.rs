@@ -92,6 +92,8 @@ pub(crate) struct Seat {
     notes: Vec<String>,
     delay: Option<(Duration, u64)>,
     answered: u64,
+    /// When it answered first and last, ns.
+    active_ns: Option<(u64, u64)>,
 }
 
 impl Seat {
@@ -126,6 +128,7 @@ impl Seat {
             notes: Vec::new(),
             delay: delay.map(|delay| (Duration::from_millis(delay.ms), delay.ticks)),
             answered: 0,
+            active_ns: None,
             run,
         })
     }
@@ -193,14 +196,17 @@ impl Seat {
         self.latencies.record(timed, duration_ns);
     }
 
-    /// Sleeps if this participant is to be slow in this tick; called before it answers.
-    pub(crate) fn dawdle(&mut self) {
+    /// Counts an answer that is about to be sent; sleeps first if this participant is to be slow.
+    pub(crate) fn answering(&mut self) {
         if let Some((delay, ticks)) = self.delay
             && self.answered < ticks
         {
             std::thread::sleep(delay);
         }
         self.answered += 1;
+        let now_ns = clock::now_ns();
+        let (first_ns, _) = self.active_ns.unwrap_or((now_ns, now_ns));
+        self.active_ns = Some((first_ns, now_ns));
     }
 
     /// Leaves the run: keeps what there is to tell in its directory.
@@ -208,11 +214,13 @@ impl Seat {
     /// # Errors
     /// A file cannot be written.
     pub(crate) fn leave(self, telling: Telling) -> Result<(), RoleError> {
+        let (first_ns, last_ns) = self.active_ns.unwrap_or_default();
         let report = RoleReport {
             role: self.role,
             pid: std::process::id(),
             ticks_answered: self.answered,
             cpu_s: clock::cpu_s(),
+            wall_s: (last_ns - first_ns) as f64 * 1e-9,
             deadline_misses: telling.deadline_misses,
             lost: telling.lost,
             counters: telling.counters,

@@ -101,7 +101,7 @@ impl Shell {
         let started_ns = clock::now_ns();
         let output = self.planner.step(&seat.scene, input, units);
         seat.record_since(Timed::PlannerStep, started_ns);
-        seat.dawdle();
+        seat.answering();
         self.tables.connect()?;
         if let Some(table) = output.table {
             self.tables.send(|out| out.copy_from(table))?;

@@ -106,7 +106,7 @@ impl Shell {
         let before = self.batches;
         while let Some(batch) = self.motion.receive()? {
             self.write(&batch)?;
-            seat.dawdle();
+            seat.answering();
         }
         if let Some(snapshot) = snapshot {
             let snapshot = Checked::new(&*snapshot, seat.counts()).map_err(refused("world"))?;

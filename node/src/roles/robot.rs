@@ -16,6 +16,7 @@ use robot::{Robot, RobotInput};
 use shm_types::{Checked, Command, WorldSnapshot};
 use world::FIRST_INCARNATION;
 
+use crate::clock;
 use crate::options::Role;
 use crate::ports::{Access, Publisher};
 use crate::roles::follower::Follower;
@@ -96,12 +97,13 @@ impl Shell {
             answer: self.questions.answer(),
         };
         let units = seat.options().settings.units_per_tick(header.busy);
-        let started_ns = self.timing.start();
+        let started_ns = clock::now_ns();
         let asked = self
             .robot
             .step(&seat.scene, input, units, &mut self.command);
-        self.timing.stop(started_ns, &mut seat.latencies);
-        seat.dawdle();
+        self.timing
+            .stepped(started_ns, &self.command, &mut seat.latencies);
+        seat.answering();
         if let Some(question) = asked {
             self.questions.ask(question)?;
         }

@@ -111,7 +111,7 @@ impl Shell {
     fn run(&mut self, seat: &mut Seat) -> Result<(), RoleError> {
         loop {
             self.step(seat)?;
-            seat.dawdle();
+            seat.answering();
             self.publish()?;
             seat.latencies.record(Timed::Tick, self.since_before());
             if self.world.outcome() != Outcome::Running {

@@ -25,7 +25,6 @@ impl Run<'_> {
     /// Lets everybody go, and gathers what they leave. Nothing of the run is left when this
     /// returns, but the trace if it was to be kept.
     pub(super) fn wind_up(mut self, end: End) -> RunReport {
-        let wall_s = self.started.elapsed().as_secs_f64();
         let (outcome, reason) = match end {
             End::Outcome(outcome) => {
                 self.await_others();
@@ -47,7 +46,8 @@ impl Run<'_> {
         }
         let mut notes = std::mem::take(&mut self.notes);
         notes.extend(roles.iter().flat_map(|role| role.notes.iter().cloned()));
-        let lost_commands = roles.iter().find(|role| role.role == Role::World);
+        let makers = roles.iter().find(|role| role.role == Role::World);
+        let (lost_commands, wall_s) = makers.map_or((0, 0.0), |world| (world.lost, world.wall_s));
         let (trace, kept) = self.keep_trace();
         RunReport {
             run_id: self.file.id_number(),
@@ -57,7 +57,7 @@ impl Run<'_> {
             counters,
             latency,
             deadline_misses: roles.iter().map(|role| role.deadline_misses).sum(),
-            lost_commands: lost_commands.map_or(0, |world| world.lost),
+            lost_commands,
             restarts: self.restarts,
             wall_s,
             oversubscribed: self.oversubscribed,

@@ -1,9 +1,13 @@
 //! How long a robot's work takes on the wall clock.
 //!
-//! Responsible for: the time of its steps and from its requests for path to their grants.
+//! Responsible for: the time of its steps, of the computations in them, and from its requests for
+//! path to their grants.
 //! Not responsible for: the planning time of the model, which is counted in work units.
+//!
+//! The machine reads no clock, so a computation is timed by the steps it took part in, from the
+//! account of work in its commands: an upper bound, since a step holds more than one computation.
 
-use shm_types::{Command, Point, RobotState};
+use shm_types::{Activity, Command, Counters, Phase, Point, RobotState};
 
 use crate::clock;
 use crate::histograms::{Latencies, Timed};
@@ -23,17 +27,61 @@ pub(super) struct Timing {
     asked: Option<Asked>,
     /// Number of the newest request for path that was sent.
     request: u32,
+    /// Work done before the step.
+    before: Counters,
+    easy: Sum,
+    selection: Sum,
+    search: Sum,
+}
+
+/// Time of the steps of one computation so far, ns.
+#[derive(Default)]
+struct Sum(u64);
+
+impl Sum {
+    /// Adds a step if it took part in one, and records the sum once the computation is over.
+    fn step(&mut self, took_part: bool, over: bool, step_ns: u64) -> Option<u64> {
+        if took_part {
+            self.0 += step_ns;
+        }
+        let sum_ns = over.then(|| std::mem::take(&mut self.0))?;
+        (sum_ns > 0).then_some(sum_ns)
+    }
 }
 
 impl Timing {
-    pub(super) fn start(&self) -> u64 {
-        clock::now_ns()
-    }
-
-    /// A step is over.
-    pub(super) fn stop(&self, started_ns: u64, latencies: &mut Latencies) {
-        let duration_ns = clock::now_ns().saturating_sub(started_ns);
-        latencies.record(Timed::RobotStep, duration_ns);
+    /// A step that began at `started_ns` has led to `command`.
+    pub(super) fn stepped(
+        &mut self,
+        started_ns: u64,
+        command: &Command,
+        latencies: &mut Latencies,
+    ) {
+        let step_ns = clock::now_ns().saturating_sub(started_ns);
+        latencies.record(Timed::RobotStep, step_ns);
+        let (before, after) = (self.before, command.counters);
+        self.before = after;
+        let selected = after.selections > before.selections;
+        let selecting = command.phase == Phase::Selecting.code();
+        let tested = after.polygon_tests > before.polygon_tests;
+        let expanded = after.cells_expanded > before.cells_expanded;
+        let searching = expanded && !selecting;
+        let computing = command.activity == Activity::Computing.code();
+        let sums = [
+            (Timed::EasyConstraints, &mut self.easy, tested, selected),
+            (
+                Timed::Selection,
+                &mut self.selection,
+                selecting || selected,
+                selected,
+            ),
+            (Timed::PathSearch, &mut self.search, searching, !computing),
+        ];
+        for (timed, sum, took_part, over) in sums {
+            if let Some(sum_ns) = sum.step(took_part, over, step_ns) {
+                latencies.record(timed, sum_ns);
+            }
+        }
     }
 
     /// A command is sent.
