@@ -4,7 +4,7 @@
 use std::ops::ControlFlow;
 
 use scene::builtin::BUILTIN;
-use scene::{Compute, GenerateOptions, Method, Scene, Settings};
+use scene::{Compute, Connectivity, GenerateOptions, Method, Scene, Settings, ShapeDraft};
 use shm_types::{Activity, Checked, MotionBatch, Outcome, WorldSnapshot};
 use sim::{SimReport, Simulation};
 use trace::{Ending, SceneRecord, Writer};
@@ -120,6 +120,36 @@ fn random_rooms_end_solved_or_stuck_for_a_reason() {
         }
     }
     assert!(solved > 20, "{solved}");
+}
+
+/// Grips that take time, round robots that fit between the lattice's points, four directions, a
+/// slow computer that all share: the same promises.
+#[test]
+fn random_rooms_with_everything_else_changed_keep_the_same_promises() {
+    let mut solved = 0;
+    for seed in 0..4 {
+        let options = GenerateOptions {
+            seed,
+            ..GenerateOptions::default()
+        };
+        let mut draft = scene::generate(&options).unwrap().scene.draft().clone();
+        draft.connectivity = Connectivity::Four;
+        draft.robot.shape = ShapeDraft::Circle(0.2);
+        (draft.robot.grasp_s, draft.robot.release_s) = (0.5, 0.255);
+        let room = Scene::new(draft).unwrap();
+        assert!(!room.lattice.exact);
+        for &method in Method::ALL {
+            let settings = Settings {
+                units_per_second: 200_000,
+                compute: Compute::Shared,
+                look_ahead_m: 0.3,
+                ..with(method)
+            };
+            let report = run(&room, &settings);
+            solved += u32::from(report.outcome == Outcome::Solved);
+        }
+    }
+    assert!(solved > 0);
 }
 
 /// What each method can see, it finishes, and what it cannot see it gets stuck on, with one robot
