@@ -1,5 +1,6 @@
 //! Whole runs in one thread: every small scenario and random rooms, every number of robots, every
 //! method. Each run is traced and checked by a checker that shares no planning code (rule 26).
+#![expect(clippy::unwrap_used, reason = "a test may fail")]
 
 use std::ops::ControlFlow;
 
@@ -309,7 +310,7 @@ fn a_look_that_is_done_within_its_step_costs_no_motion() {
     assert!(report.counters().path_plans > 50);
 }
 
-/// What every one of a run's robots holds to be its place after a restart is in the snapshot.
+/// All that a robot needs to go on after a restart is in the snapshot.
 #[test]
 fn restarted_robots_take_up_where_they_were() {
     let scene = shipped("h1");
@@ -318,7 +319,7 @@ fn restarted_robots_take_up_where_they_were() {
         let mut simulation = Simulation::new(&scene, &settings, 1);
         while simulation.outcome() == Outcome::Running {
             let tick = simulation.tick().header.tick;
-            if tick % every == 0 && tick < 5_000 {
+            if tick.is_multiple_of(every) && tick < 5_000 {
                 simulation.restart_robot((tick / every) as usize % scene.homes.len());
             }
         }
