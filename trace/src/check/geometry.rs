@@ -15,6 +15,9 @@ use nalgebra::Vector2;
 
 use crate::record::Outline;
 
+/// How far what lies outside of a side reaches in, m: more than rounding, far less than matters.
+const EDGE_M: f64 = 1e-9;
+
 /// A point, an offset or a direction; m.
 pub(super) type Vector = Vector2<f64>;
 
@@ -181,12 +184,13 @@ impl Line {
         })
     }
 
-    /// When it is outside of this side, straight across from it, and nearer than `reach`.
+    /// When it is straight across from this side, outside of it, and nearer than `reach`. Reaching
+    /// in a little leaves nothing between inside and outside for a motion along the side itself.
     fn beside(&self, side: &Side, reach: f64) -> Option<Interval> {
         let start = side.along.dot(&side.corner);
         let height = side.outward.dot(&side.corner);
         let interval = self.clip((0.0, 1.0), side.outward, height + reach)?;
-        let interval = self.clip(interval, -side.outward, -height)?;
+        let interval = self.clip(interval, -side.outward, EDGE_M - height)?;
         let interval = self.clip(interval, side.along, start + side.length)?;
         self.clip(interval, -side.along, -start)
     }

@@ -12,7 +12,12 @@ const DIFFERENCE_M: f64 = 1e-7;
 
 fn shapes() -> impl Strategy<Value = Shape> {
     let width = 0.05..1.0_f64;
+    let tenths = 1..8_i32;
+    let on_lattice = (tenths.clone(), tenths).prop_map(|(x, y)| {
+        Shape::rectangle(Vec2::new(0.1 * f64::from(x), 0.1 * f64::from(y))).unwrap()
+    });
     prop_oneof![
+        on_lattice,
         (width.clone(), width.clone())
             .prop_map(|(x, y)| Shape::rectangle(Vec2::new(x, y)).unwrap()),
         width
@@ -41,10 +46,10 @@ fn polygons(width: impl Strategy<Value = f64> + Clone) -> impl Strategy<Value = 
 }
 
 fn places() -> impl Strategy<Value = Vec2> {
-    // A lattice as well, since it is there that bodies just touch.
+    // On a lattice as well, where bodies just touch and slide along each other.
     let free = (-2.0..2.0_f64, -2.0..2.0_f64).prop_map(|(x, y)| Vec2::new(x, y));
     let lattice = (-20..=20_i32, -20..=20_i32)
-        .prop_map(|(x, y)| Vec2::new(f64::from(x) * 0.1, f64::from(y) * 0.1));
+        .prop_map(|(x, y)| Vec2::new(f64::from(x) * 0.05, f64::from(y) * 0.05));
     prop_oneof![free, lattice]
 }
 
@@ -97,6 +102,23 @@ proptest! {
         let grown = scene::swept_overlap(&moving.grown(distance_m), from, to, &standing, Vec2::zeros());
         prop_assert!(grown || meeting.nearer_than(distance_m - 1e-5, from, to).is_none());
     }
+}
+
+/// A motion along a side, just touching, is at no distance all the way, and overlaps nowhere.
+#[test]
+fn sliding_along_a_side_is_touching() {
+    let half = Vec2::new(0.25, 0.25);
+    let robot = Shape::rectangle(half * 2.0).unwrap();
+    let object = Shape::rectangle(Vec2::new(0.4, 0.4)).unwrap();
+    let meeting = meeting(&robot, &object);
+    let at = Vec2::new(6.1, 0.9);
+    let (from, to) = (Vec2::new(6.1, 0.45) - at, Vec2::new(7.4, 0.45) - at);
+    let (start, end) = meeting.nearer_than(0.05, from, to).unwrap();
+    assert!(
+        start == 0.0 && (end - 0.5 / 1.3).abs() < 1e-12,
+        "{start} to {end}"
+    );
+    assert_eq!(meeting.nearer_than(-OVERLAP_M, from, to), None);
 }
 
 #[test]
