@@ -1,5 +1,6 @@
 //! Real processes against the in-process driver: the same state at every tick, whoever is slow or
 //! stopped; and in real time, whoever is stopped is held, alone.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::fs;
 use std::path::{Path, PathBuf};
