@@ -50,16 +50,16 @@ pub(crate) enum Command {
     List(ListArgs),
     /// Measure how fast this machine runs a scenario
     Bench(BenchArgs),
-    /// [role] The process that owns the state of all bodies
+    /// Role: the process that owns the state of all bodies
     #[command(hide = true)]
     World(RoleArgs),
-    /// [role] The process that works out hard constraints
+    /// Role: the process that works out hard constraints
     #[command(hide = true)]
     Planner(RoleArgs),
-    /// [role] The process that moves one robot
+    /// Role: the process that moves one robot
     #[command(hide = true)]
     Robot(RoleArgs),
-    /// [role] The process that writes the trace
+    /// Role: the process that writes the trace
     #[command(hide = true)]
     Recorder(RoleArgs),
 }
