@@ -35,6 +35,8 @@ const PERIOD: Duration = Duration::from_millis(5);
 const PROGRESS_EVERY: Duration = Duration::from_millis(100);
 /// How often set-up is tried.
 const SET_UP_ATTEMPTS: u32 = 3;
+/// How long the news of the run's end may take to come to the supervisor.
+const NEWS_GRACE: Duration = Duration::from_millis(200);
 /// How long the world may take to end the run once it is asked to.
 const STOP_GRACE: Duration = Duration::from_secs(3);
 
@@ -291,9 +293,7 @@ impl<'p> Run<'p> {
                 return Ok(End::Outcome(outcome));
             }
             if let Some(words) = self.lost() {
-                // It may have left because it has seen the end that we have not.
-                self.watch.look()?;
-                return Ok(self.watch.outcome().map_or(End::Lost(words), End::Outcome));
+                return self.end_after(words);
             }
             if self.signals.take() {
                 if stop_by.is_some() {
@@ -314,6 +314,20 @@ impl<'p> Run<'p> {
             }
             std::thread::sleep(PERIOD);
         }
+    }
+
+    /// A participant has left: because it has seen an end that is yet to come to us, or because
+    /// it was lost.
+    fn end_after(&mut self, words: String) -> Result<End, RunError> {
+        let by = Instant::now() + NEWS_GRACE;
+        while Instant::now() < by {
+            self.watch.look()?;
+            if let Some(outcome) = self.watch.outcome() {
+                return Ok(End::Outcome(outcome));
+            }
+            std::thread::sleep(PERIOD);
+        }
+        Ok(End::Lost(words))
     }
 
     /// The last words of a participant whose process has ended, if one has.

@@ -37,7 +37,7 @@ pub fn main(run_dir: &Path) -> Result<(), RoleError> {
     let mut shell = Shell::new(&seat)?;
     seat.settle();
     shell.tell()?;
-    while shell.ended.is_none() && !seat.is_stopped() {
+    while !shell.has_seen_the_end() && !seat.is_stopped() {
         if !shell.look(&mut seat)? {
             std::thread::sleep(PERIOD);
         }
@@ -64,6 +64,8 @@ struct Shell {
     batches: u64,
     /// How the run ended, and when, ns of virtual time.
     ended: Option<(Outcome, u64)>,
+    /// Whether the snapshot after that has come, so that everybody can know of the end.
+    end_is_out: bool,
 }
 
 impl Shell {
@@ -96,7 +98,12 @@ impl Shell {
             },
             batches: 0,
             ended: None,
+            end_is_out: false,
         })
+    }
+
+    const fn has_seen_the_end(&self) -> bool {
+        self.ended.is_some() && self.end_is_out
     }
 
     /// Writes all that has come; whether anything had.
@@ -110,6 +117,7 @@ impl Shell {
         }
         if let Some(snapshot) = snapshot {
             let snapshot = Checked::new(&*snapshot, seat.counts()).map_err(refused("world"))?;
+            self.end_is_out = snapshot.header.outcome != Outcome::Running.code();
             self.writer
                 .snapshot(snapshot)
                 .map_err(|error| unwritten(&self.path, &error))?;
