@@ -1,19 +1,23 @@
-//! What a run is asked to be, parsed once at the edge, and the part of it every process reads.
+//! What every process of a run is told, parsed once at the edge.
 //!
-//! Responsible for: the plan a caller hands to the supervisor, the `run.json` each process of the
-//! run starts from, and the refusals that need nothing but the plan.
-//! Not responsible for: command lines (the binary's) or limits of the machine (`domain`).
-//!
-//! Terms: a *role* is a kind of process; a *participant* is one process of a run.
+//! Responsible for: the options each process of the run starts from, their limits, and the
+//! refusals that need nothing but them.
+//! Not responsible for: command lines (the binary's), limits of the machine (`shared_memory`), or
+//! what the supervisor alone is told (`plan`).
 
-use std::ffi::OsString;
-use std::fmt;
+mod plan;
+mod role;
+#[cfg(test)]
+mod tests;
+
 use std::path::PathBuf;
-use std::time::Duration;
 
 use scene::Settings;
 use serde::{Deserialize, Serialize};
-use shm_types::{Counts, RoleKind};
+use shm_types::Counts;
+
+pub use plan::{DEFAULT_SETUP_DEADLINE, DEFAULT_SILENCE_LIMIT, Launcher, RunPlan};
+pub use role::{Role, UnknownRole};
 
 /// Default period of the world in real time.
 pub const DEFAULT_RATE_HZ: u32 = 1_000;
@@ -25,10 +29,6 @@ pub const DEFAULT_MONITORS: u32 = 4;
 pub const MAX_MONITORS: u32 = 64;
 /// Default rate of whole states in the trace, per second of world time.
 pub const DEFAULT_STATE_RATE_HZ: f64 = 10.0;
-/// How long all participants together may take to answer their first tick.
-pub const DEFAULT_SETUP_DEADLINE: Duration = Duration::from_secs(20);
-/// How long a participant may be silent in real time before it is killed.
-pub const DEFAULT_SILENCE_LIMIT: Duration = Duration::from_secs(5);
 
 /// Who sets the pace.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -55,83 +55,6 @@ pub enum Wait {
     Hybrid,
     /// Sleeps until it is woken by an event.
     Block,
-}
-
-/// One process of a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Role {
-    /// Owns the state of all bodies.
-    World,
-    /// Works out hard constraints.
-    Planner,
-    /// Moves the robot of this number.
-    Robot(u32),
-    /// Writes the trace.
-    Recorder,
-}
-
-impl Role {
-    /// All participants of a run with `robots` robots, in the order in which they are started.
-    pub fn all(robots: u32) -> impl Iterator<Item = Self> {
-        [Self::World, Self::Planner, Self::Recorder]
-            .into_iter()
-            .chain((0..robots).map(Self::Robot))
-    }
-
-    /// The subcommand that runs it.
-    #[must_use]
-    pub const fn subcommand(self) -> &'static str {
-        match self {
-            Self::World => "world",
-            Self::Planner => "planner",
-            Self::Robot(_) => "robot",
-            Self::Recorder => "recorder",
-        }
-    }
-
-    /// Its kind on the wire.
-    #[must_use]
-    pub const fn kind(self) -> RoleKind {
-        match self {
-            Self::World => RoleKind::World,
-            Self::Planner => RoleKind::Planner,
-            Self::Robot(_) => RoleKind::Robot,
-            Self::Recorder => RoleKind::Recorder,
-        }
-    }
-}
-
-/// `world`, `planner`, `robot-2`, `recorder`: in messages and in file names.
-impl fmt::Display for Role {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Robot(index) => write!(f, "robot-{index}"),
-            other => f.write_str(other.subcommand()),
-        }
-    }
-}
-
-/// A text that names no participant.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no role is called {0:?}; roles are world, planner, recorder and robot-N")]
-pub struct UnknownRole(pub String);
-
-impl std::str::FromStr for Role {
-    type Err = UnknownRole;
-
-    fn from_str(text: &str) -> Result<Self, UnknownRole> {
-        match text {
-            "world" => Ok(Self::World),
-            "planner" => Ok(Self::Planner),
-            "recorder" => Ok(Self::Recorder),
-            other => other
-                .strip_prefix("robot-")
-                .and_then(|index| index.parse().ok())
-                .map(Self::Robot)
-                .ok_or_else(|| UnknownRole(other.to_owned())),
-        }
-    }
 }
 
 /// A participant made slow on purpose: it sleeps this long before it answers each tick. Tests
@@ -187,50 +110,6 @@ impl RunOptions {
             delays: Vec::new(),
             trace: None,
             hashes: None,
-        }
-    }
-}
-
-/// How the supervisor starts a role: `program before… ROLE --run DIR [--index N]`.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Launcher {
-    /// The executable.
-    pub program: PathBuf,
-    /// Arguments before the role's name.
-    pub before: Vec<OsString>,
-    /// Whether the roles' standard error is the supervisor's; otherwise it goes to a file in the
-    /// run's directory, whose end is quoted when the role fails.
-    pub inherit_stderr: bool,
-}
-
-/// All the supervisor is told.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RunPlan {
-    /// Name of the run; a live name is refused. Its id serves if none is given.
-    pub name: Option<String>,
-    /// The canonical scenario text all processes start from, cut to the robots that take part.
-    pub scenario: String,
-    /// What every process of the run reads.
-    pub options: RunOptions,
-    /// How a role is started.
-    pub launcher: Launcher,
-    /// How long all participants together may take to answer their first tick, per attempt.
-    pub setup_deadline: Duration,
-    /// How long a participant may be silent in real time before it is killed. Lockstep waits.
-    pub silence_limit: Duration,
-}
-
-impl RunPlan {
-    /// A plan with the default limits.
-    #[must_use]
-    pub fn new(scenario: String, options: RunOptions, launcher: Launcher) -> Self {
-        Self {
-            name: None,
-            scenario,
-            options,
-            launcher,
-            setup_deadline: DEFAULT_SETUP_DEADLINE,
-            silence_limit: DEFAULT_SILENCE_LIMIT,
         }
     }
 }
@@ -375,104 +254,5 @@ impl Clock {
                 ((speed * 1e9 / f64::from(rate_hz.max(1))).round() as u64).max(1)
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const COUNTS: Counts = Counts {
-        robots: 4,
-        objects: 5,
-    };
-
-    fn options() -> RunOptions {
-        RunOptions::new(Settings::default())
-    }
-
-    #[test]
-    fn spinning_takes_a_core_for_each_process() {
-        let spin = RunOptions {
-            wait: Wait::Spin,
-            ..options()
-        };
-        assert_eq!(spin.check(COUNTS, 7), Ok(()));
-        let refused = spin.check(COUNTS, 6);
-        let expected = OptionError::Spin {
-            processes: 7,
-            cores: 6,
-        };
-        assert_eq!(refused, Err(expected));
-        assert_eq!(options().check(COUNTS, 2), Ok(()), "hybrid may share cores");
-    }
-
-    #[test]
-    fn real_time_priority_with_yielding_takes_a_core_for_each_process() {
-        let asked = |wait, clock| RunOptions {
-            wait,
-            clock,
-            realtime_scheduling: true,
-            ..options()
-        };
-        let real = Clock::Real {
-            rate_hz: 1_000,
-            speed: 1.0,
-        };
-        assert!(
-            asked(Wait::Hybrid, Clock::Lockstep)
-                .check(COUNTS, 2)
-                .is_err()
-        );
-        assert_eq!(
-            asked(Wait::Hybrid, Clock::Lockstep).check(COUNTS, 7),
-            Ok(())
-        );
-        assert_eq!(asked(Wait::Block, Clock::Lockstep).check(COUNTS, 2), Ok(()));
-        // In real time everybody sleeps to a deadline.
-        assert_eq!(asked(Wait::Hybrid, real).check(COUNTS, 2), Ok(()));
-    }
-
-    #[test]
-    fn numbers_out_of_range_are_refused() {
-        for (rate_hz, speed) in [(0, 1.0), (MAX_RATE_HZ + 1, 1.0), (1, 0.0), (1, f64::NAN)] {
-            let clock = Clock::Real { rate_hz, speed };
-            let options = RunOptions { clock, ..options() };
-            let refused = options.check(COUNTS, 8);
-            assert!(matches!(refused, Err(OptionError::Range { .. })));
-        }
-        let delay = Delay {
-            role: Role::Robot(4),
-            ms: 1,
-            ticks: 1,
-        };
-        let options = RunOptions {
-            delays: vec![delay],
-            ..options()
-        };
-        let refused = options.check(COUNTS, 8);
-        assert!(matches!(refused, Err(OptionError::Delay { .. })));
-    }
-
-    #[test]
-    fn roles_are_read_as_they_are_written() {
-        for role in Role::all(3) {
-            assert_eq!(role.to_string().parse(), Ok(role));
-        }
-        for text in ["", "robot", "robot-", "robot-x", "World"] {
-            assert_eq!(text.parse::<Role>(), Err(UnknownRole(text.to_owned())));
-        }
-    }
-
-    #[test]
-    fn virtual_time_of_a_period_is_speed_over_rate() {
-        let real = Clock::Real {
-            rate_hz: 1_000,
-            speed: 20.0,
-        };
-        assert_eq!(real.tick_ns(7), 20_000_000);
-        assert_eq!(real.period_ns(), Some(1_000_000));
-        assert_eq!(Clock::Lockstep.tick_ns(7), 7);
-        assert_eq!(Clock::Lockstep.period_ns(), None);
     }
 }

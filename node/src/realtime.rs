@@ -38,11 +38,8 @@ pub(crate) fn pin(role: Role, robots: u32) -> Result<(), String> {
         .and_then(|turn| cores.get(turn));
     match core {
         Some(core) if core_affinity::set_for_current(*core) => Ok(()),
-        Some(core) => Err(format!(
-            "{role}: not pinned, the system refused core {}",
-            core.id
-        )),
-        None => Err(format!("{role}: not pinned, no core is known")),
+        Some(core) => Err(format!("not pinned, the system refused core {}", core.id)),
+        None => Err("not pinned, no core is known".to_owned()),
     }
 }
 
@@ -60,7 +57,7 @@ pub(crate) fn schedule_fifo(role: Role) -> Result<(), String> {
         return Ok(());
     }
     Err(format!(
-        "{role}: runs without SCHED_FIFO, it is not permitted here ({}); it takes CAP_SYS_NICE \
+        "runs without SCHED_FIFO, it is not permitted here ({}); it takes CAP_SYS_NICE \
          or a real-time priority limit",
         std::io::Error::last_os_error()
     ))
@@ -71,13 +68,14 @@ pub(crate) fn schedule_fifo(role: Role) -> Result<(), String> {
 ///
 /// # Errors
 /// One line that says it was not permitted.
-pub(crate) fn lock_memory(role: Role) -> Result<(), String> {
+pub(crate) fn lock_memory() -> Result<(), String> {
     let unlimited = getrlimit(Resource::Memlock).current.is_none();
     if !unlimited && !may_lock() {
-        return Err(format!(
-            "{role}: runs without locked memory, it is limited here; it takes CAP_IPC_LOCK or no \
-             memlock limit"
-        ));
+        return Err(
+            "runs without locked memory, it is limited here; it takes CAP_IPC_LOCK or no memlock \
+             limit"
+                .to_owned(),
+        );
     }
     // SAFETY: takes no pointers; it changes only how pages of this process are kept.
     let status = unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) };
@@ -85,7 +83,7 @@ pub(crate) fn lock_memory(role: Role) -> Result<(), String> {
         return Ok(());
     }
     Err(format!(
-        "{role}: runs without locked memory ({})",
+        "runs without locked memory ({})",
         std::io::Error::last_os_error()
     ))
 }

@@ -16,10 +16,12 @@ use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
 /// Where POSIX shared memory lies on Linux.
 pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
+/// End of the name of the file that every set-up in a domain reads.
+const MANAGEMENT: &[u8] = b".global_mgmt";
 /// Descriptors a process needs beside its connections.
 const BASE_DESCRIPTORS: u64 = 128;
 /// Descriptors each other participant costs the one with the most connections.
-const DESCRIPTORS_PER_PARTICIPANT: u64 = 16;
+const DESCRIPTORS_PER_PARTICIPANT: u64 = 8;
 
 /// Why a run has no room on this machine.
 #[derive(Debug, thiserror::Error)]
@@ -101,9 +103,12 @@ pub(crate) fn reserve(bytes: u64, participants: u64) -> Result<(), ResourceError
 /// the first node of a run; later ones of the same user still join.
 ///
 /// # Errors
-/// A file's mode cannot be changed.
+/// A file's mode cannot be changed, or somebody has emptied the one that every set-up reads.
 pub(crate) fn make_private(prefix: &str) -> io::Result<()> {
     for_each_file(prefix, |path, file| {
+        if file.len() == 0 && path.as_os_str().as_encoded_bytes().ends_with(MANAGEMENT) {
+            return Err(io::Error::other(format!("{} is empty", path.display())));
+        }
         if file.permissions().mode() & 0o077 == 0 {
             return Ok(());
         }
@@ -203,6 +208,8 @@ mod tests {
         let path = own.file("1.global_mgmt", b"x");
         fs::set_permissions(&path, fs::Permissions::from_mode(0o666)).unwrap();
         make_private(&own.0).unwrap();
+        fs::write(&path, b"").unwrap();
+        assert!(make_private(&own.0).is_err(), "an emptied one is noticed");
         assert_eq!(
             fs::metadata(&path).unwrap().permissions().mode() & 0o777,
             0o600

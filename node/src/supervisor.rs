@@ -10,6 +10,7 @@
 //! is silent for too long is killed and declared gone, and the others go on around it.
 
 mod ending;
+mod set_up;
 mod signals;
 mod watch;
 
@@ -20,7 +21,7 @@ use shm_types::{Checked, ControlKind, ControlRequest, Outcome, RoleKind, WorldSn
 use world::FIRST_INCARNATION;
 
 use crate::children::Participant;
-use crate::domain::{DomainError, NewRun, Process, RunDirectory, RunFile};
+use crate::domain::{DomainError, NewRun, RunDirectory, RunFile};
 use crate::options::{self, Clock, OptionError, Role, RunPlan};
 use crate::ports::{self, IpcNode, TopicError};
 use crate::report::RunReport;
@@ -33,8 +34,6 @@ use watch::Watch;
 const PERIOD: Duration = Duration::from_millis(5);
 /// Wall time between two calls of [`Observer::progress`].
 const PROGRESS_EVERY: Duration = Duration::from_millis(100);
-/// How often set-up is tried.
-const SET_UP_ATTEMPTS: u32 = 3;
 /// How long the news of the run's end may take to come to the supervisor.
 const NEWS_GRACE: Duration = Duration::from_millis(200);
 /// How long the world may take to end the run once it is asked to.
@@ -131,7 +130,7 @@ pub fn run(plan: &RunPlan, observer: &mut dyn Observer) -> Result<RunReport, Run
         Some(end) => end,
         None => {
             observer.started(&run.file.name);
-            run.attend(observer)?
+            run.attend(observer)
         }
     };
     let report = run.wind_up(end);
@@ -154,6 +153,8 @@ struct Run<'p> {
     signals: Signals,
     requests: u64,
     restarts: u64,
+    /// By when the world has to have ended the run, once it is asked to.
+    stop_by: Option<Instant>,
     notes: Vec<String>,
     oversubscribed: bool,
 }
@@ -182,7 +183,7 @@ impl<'p> Run<'p> {
             options: &options,
         })?;
         let node = ports::join(&file.root, &file.prefix, "supervisor")?;
-        make_private(&file)?;
+        set_up::make_private(&file)?;
         let topics = topics.create(&node)?;
         Ok(Self {
             plan,
@@ -194,119 +195,21 @@ impl<'p> Run<'p> {
             signals,
             requests: 0,
             restarts: 0,
+            stop_by: None,
             notes: Vec::new(),
             oversubscribed: options::processes(counts) > cores,
             file,
         })
     }
 
-    /// Starts every role, and again those that do not get ready in time: a process killed while
-    /// it was setting up can leave a half-made file that blocks everybody after it.
-    fn set_up(&mut self) -> Result<Option<End>, RunError> {
-        for _ in 0..SET_UP_ATTEMPTS {
-            self.start_missing()?;
-            let deadline = Instant::now() + self.plan.setup_deadline;
-            while Instant::now() < deadline {
-                self.watch.look()?;
-                if self.watch.all_are_ready() {
-                    self.watch.set_up_is_over();
-                    return Ok(None);
-                }
-                if self.signals.take() {
-                    return Ok(Some(End::Interrupted));
-                }
-                if let Some(words) = self.lost() {
-                    return Err(RunError::SetUp(words));
-                }
-                std::thread::sleep(PERIOD);
-            }
-            self.give_up_unready();
-        }
-        Err(RunError::Unready {
-            roles: names(&self.watch.unready()),
-            seconds: self.plan.setup_deadline.as_secs_f64(),
-            attempts: SET_UP_ATTEMPTS,
-        })
-    }
-
-    fn start_missing(&mut self) -> Result<(), RunError> {
-        for role in Role::all(self.file.robots) {
-            if self.participants.iter().any(|one| one.role == role) {
-                continue;
-            }
-            let launcher = &self.plan.launcher;
-            let participant = Participant::start(launcher, role, self.directory.path());
-            self.participants
-                .push(participant.map_err(|source| RunError::Start {
-                    role,
-                    program: launcher.program.display().to_string(),
-                    source,
-                })?);
-        }
-        self.participants.sort_by_key(|one| one.role);
-        self.file.processes = self
-            .participants
-            .iter()
-            .map(|one| Process {
-                role: one.role,
-                pid: one.pid(),
-            })
-            .collect();
-        Ok(self.directory.write_run(&self.file)?)
-    }
-
-    /// Kills and reaps every process that is still in set-up, then removes what such a process
-    /// can have left half-made.
-    fn give_up_unready(&mut self) {
-        let unready = self.watch.unready();
-        for one in &mut self.participants {
-            if unready.contains(&one.role) {
-                one.kill();
-            }
-        }
-        self.participants.retain(|one| !unready.contains(&one.role));
-        self.restarts += unready.len() as u64;
-        self.notes.push(format!(
-            "{} did not get ready in time and had to be started again",
-            names(&unready)
-        ));
-        self.node.try_cleanup_dead_nodes();
-        match shared_memory::remove_half_made(&self.file.prefix) {
-            Ok(0) => {}
-            Ok(files) => self.notes.push(format!("{files} half-made files removed")),
-            Err(error) => self
-                .notes
-                .push(format!("half-made files not removed: {error}")),
-        }
-        if let Err(error) = make_private(&self.file) {
-            self.notes.push(error.to_string());
-        }
-    }
-
-    /// Watches until the run is over.
-    fn attend(&mut self, observer: &mut dyn Observer) -> Result<End, RunError> {
-        let mut stop_by: Option<Instant> = None;
+    /// Watches until the run is over. Shared memory that fails ends it too.
+    fn attend(&mut self, observer: &mut dyn Observer) -> End {
         let mut shown = Instant::now();
         loop {
-            self.watch.look()?;
-            if let Some(outcome) = self.watch.outcome() {
-                return Ok(End::Outcome(outcome));
-            }
-            if let Some(words) = self.lost() {
-                return self.end_after(words);
-            }
-            if self.signals.take() {
-                if stop_by.is_some() {
-                    return Ok(End::Interrupted);
-                }
-                self.ask(ControlKind::Stop, RoleKind::World, 0)?;
-                stop_by = Some(Instant::now() + STOP_GRACE);
-            }
-            if stop_by.is_some_and(|by| Instant::now() > by) {
-                return Ok(End::Interrupted);
-            }
-            if let Some(end) = self.dismiss_silent()? {
-                return Ok(end);
+            match self.watch_once() {
+                Ok(None) => {}
+                Ok(Some(end)) => return end,
+                Err(error) => return End::Lost(error.to_string()),
             }
             if shown.elapsed() >= PROGRESS_EVERY {
                 shown = Instant::now();
@@ -316,9 +219,31 @@ impl<'p> Run<'p> {
         }
     }
 
+    /// One look at everything; the end, if this is it.
+    fn watch_once(&mut self) -> Result<Option<End>, TopicError> {
+        self.watch.look()?;
+        if let Some(outcome) = self.watch.outcome() {
+            return Ok(Some(End::Outcome(outcome)));
+        }
+        if let Some(words) = self.lost() {
+            return self.end_after(words).map(Some);
+        }
+        if self.signals.take() {
+            if self.stop_by.is_some() {
+                return Ok(Some(End::Interrupted));
+            }
+            self.ask(ControlKind::Stop, RoleKind::World, 0)?;
+            self.stop_by = Some(Instant::now() + STOP_GRACE);
+        }
+        if self.stop_by.is_some_and(|by| Instant::now() > by) {
+            return Ok(Some(End::Interrupted));
+        }
+        self.dismiss_silent()
+    }
+
     /// A participant has left: because it has seen an end that is yet to come to us, or because
     /// it was lost.
-    fn end_after(&mut self, words: String) -> Result<End, RunError> {
+    fn end_after(&mut self, words: String) -> Result<End, TopicError> {
         let by = Instant::now() + NEWS_GRACE;
         while Instant::now() < by {
             self.watch.look()?;
@@ -341,7 +266,7 @@ impl<'p> Run<'p> {
 
     /// In real time, kills who has been silent for too long. A robot is declared gone; without
     /// any other participant the run cannot go on.
-    fn dismiss_silent(&mut self) -> Result<Option<End>, RunError> {
+    fn dismiss_silent(&mut self) -> Result<Option<End>, TopicError> {
         if self.file.options.clock == Clock::Lockstep {
             return Ok(None);
         }
@@ -365,7 +290,7 @@ impl<'p> Run<'p> {
     }
 
     /// Tells the world.
-    fn ask(&mut self, kind: ControlKind, role: RoleKind, index: u32) -> Result<(), RunError> {
+    fn ask(&mut self, kind: ControlKind, role: RoleKind, index: u32) -> Result<(), TopicError> {
         self.requests += 1;
         let request = ControlRequest {
             id: self.requests,
@@ -374,20 +299,11 @@ impl<'p> Run<'p> {
             index,
             incarnation: FIRST_INCARNATION,
         };
-        Ok(self.watch.ask(request)?)
+        self.watch.ask(request)
     }
 }
 
-/// Takes the run's files in shared memory away from everybody else.
-fn make_private(file: &RunFile) -> Result<(), RunError> {
-    shared_memory::make_private(&file.prefix)
-        .map_err(|source| DomainError::File {
-            path: shared_memory::SHARED_MEMORY.into(),
-            source,
-        })
-        .map_err(RunError::from)
-}
-
+/// Their names, for people.
 fn names(roles: &[Role]) -> String {
     let names: Vec<_> = roles.iter().map(ToString::to_string).collect();
     names.join(", ")

@@ -141,7 +141,7 @@ impl Seat {
             asked.push(realtime::pin(self.role, self.run.robots));
         }
         if self.options().realtime_scheduling {
-            asked.push(realtime::lock_memory(self.role));
+            asked.push(realtime::lock_memory());
             asked.push(realtime::schedule_fifo(self.role));
         }
         self.notes.extend(asked.into_iter().filter_map(Result::err));

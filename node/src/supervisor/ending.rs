@@ -14,7 +14,7 @@ use crate::histograms::Latencies;
 use crate::options::Role;
 use crate::report::{RoleReport, RunReport, WorkReport, WorldReport};
 use crate::roles::TRACE_FILE;
-use crate::supervisor::{End, PERIOD, Run};
+use crate::supervisor::{End, PERIOD, Run, names};
 
 /// How long participants may take to leave by themselves. The recorder has a file to finish.
 const LEAVE_GRACE: Duration = Duration::from_secs(10);
@@ -45,7 +45,7 @@ impl Run<'_> {
             }
         }
         let mut notes = std::mem::take(&mut self.notes);
-        notes.extend(roles.iter().flat_map(|role| role.notes.iter().cloned()));
+        notes.extend(joined_notes(&roles));
         let makers = roles.iter().find(|role| role.role == Role::World);
         let (lost_commands, wall_s) = makers.map_or((0, 0.0), |world| (world.lost, world.wall_s));
         let (trace, kept) = self.keep_trace();
@@ -153,5 +153,47 @@ impl Run<'_> {
             }
             Err(_) => (None, None),
         }
+    }
+}
+
+/// What the participants note, each once, with the names of all that note it.
+fn joined_notes(roles: &[RoleReport]) -> Vec<String> {
+    let mut texts: Vec<(&str, Vec<Role>)> = Vec::new();
+    for role in roles {
+        for note in &role.notes {
+            match texts.iter_mut().find(|(text, _)| text == note) {
+                Some((_, who)) => who.push(role.role),
+                None => texts.push((note, vec![role.role])),
+            }
+        }
+    }
+    let lines = texts.into_iter().map(|(text, who)| {
+        let everybody = who.len() == roles.len();
+        let who = if everybody {
+            "all".to_owned()
+        } else {
+            names(&who)
+        };
+        format!("{who}: {text}")
+    });
+    lines.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_all_note_is_told_once() {
+        let mut roles =
+            [Role::World, Role::Planner, Role::Robot(1)].map(|role| RoleReport::missing(role, 1));
+        for role in &mut roles {
+            role.notes.push("is slow".to_owned());
+        }
+        for role in &mut roles[1..] {
+            role.notes.push("is late".to_owned());
+        }
+        let expected = ["all: is slow", "planner, robot-1: is late"];
+        assert_eq!(joined_notes(&roles), expected);
     }
 }

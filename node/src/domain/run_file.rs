@@ -1,0 +1,101 @@
+//! `run.json` and the canonical scenario: what every process of a run starts from.
+//!
+//! Responsible for: what they hold and how they are read.
+//! Not responsible for: writing them (`domain`), or what the options mean.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use shm_types::Counts;
+use shm_types::capacity::LAYOUT_VERSION;
+
+use crate::domain::{DomainError, RUN_FILE, SCENARIO_FILE, file_error};
+use crate::options::{Role, RunOptions};
+
+/// `run.json`: what every process of the run starts from, and monitors find it by.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunFile {
+    /// Layout of the messages.
+    pub layout_version: u32,
+    /// Eight hexadecimal digits.
+    pub id: String,
+    /// Its name; the id if none was given.
+    pub name: String,
+    /// Prefix of its files in shared memory.
+    pub prefix: String,
+    /// Its directory, and the root of its iceoryx2 domain.
+    pub root: PathBuf,
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Hash of the canonical scenario.
+    pub scenario_hash: u64,
+    /// Robots.
+    pub robots: u32,
+    /// Objects.
+    pub objects: u32,
+    /// Bytes of shared memory that all segments can come to hold.
+    pub shared_memory_bytes: u64,
+    /// Process id of the supervisor.
+    pub supervisor_pid: u32,
+    /// The processes, once started.
+    pub processes: Vec<Process>,
+    /// What the run was asked to be.
+    pub options: RunOptions,
+}
+
+/// One process of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Process {
+    /// Which participant.
+    pub role: Role,
+    /// Its process id.
+    pub pid: u32,
+}
+
+impl RunFile {
+    /// Its id as a number; 0 for an id that is none.
+    #[must_use]
+    pub fn id_number(&self) -> u64 {
+        u64::from_str_radix(&self.id, 16).unwrap_or(0)
+    }
+
+    /// Robots and objects.
+    #[must_use]
+    pub const fn counts(&self) -> Counts {
+        Counts {
+            robots: self.robots,
+            objects: self.objects,
+        }
+    }
+
+    /// Reads the run in a directory.
+    ///
+    /// # Errors
+    /// There is none of this version.
+    pub fn read(directory: &Path) -> Result<Self, DomainError> {
+        let path = directory.join(RUN_FILE);
+        let text = fs::read_to_string(&path).map_err(|e| file_error(&path, e))?;
+        let foreign = |reason: String| DomainError::Foreign {
+            path: path.clone(),
+            reason,
+        };
+        let run: Self = serde_json::from_str(&text).map_err(|e| foreign(e.to_string()))?;
+        if run.layout_version != LAYOUT_VERSION {
+            return Err(foreign(format!(
+                "its messages have layout {}, this program's {LAYOUT_VERSION}",
+                run.layout_version
+            )));
+        }
+        Ok(run)
+    }
+
+    /// The canonical scenario text of the run in a directory.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub fn read_scenario(directory: &Path) -> Result<String, DomainError> {
+        let path = directory.join(SCENARIO_FILE);
+        fs::read_to_string(&path).map_err(|e| file_error(&path, e))
+    }
+}
