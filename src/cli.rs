@@ -191,6 +191,18 @@ pub(crate) struct SpeedArgs {
     pub(crate) json: bool,
 }
 
+/// Where a benchmark's results go.
+#[derive(Debug, Args)]
+pub(crate) struct OutputArgs {
+    /// Write JSON, CSV and the HTML report into this directory, made if need be
+    /// [default: target/bench/ and the workload's name]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print the results as one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
 /// Parses a finite number within the closed range, for clap.
 pub(crate) fn number(
     least: f64,

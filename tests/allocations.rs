@@ -109,7 +109,7 @@ fn complete_runs_allocate_nothing() {
         );
         assert_eq!(counters.polygon_tests > 0, method.uses_easy(), "{method}");
         assert_eq!(
-            report.hard_constraints > 0,
+            report.world.constraints_found > 0,
             method != Method::NoAction,
             "{method}"
         );

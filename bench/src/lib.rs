@@ -4,5 +4,11 @@
 //! were measured on.
 //! Not responsible for: command lines or printing (the binary), or what is correct (tests).
 
+pub mod figure;
+pub mod files;
 pub mod machine;
+pub mod progress;
+pub mod report;
+pub mod results;
 pub mod speed;
+pub mod stats;

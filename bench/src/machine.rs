@@ -6,12 +6,12 @@
 use std::fs;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 const SECONDS_PER_DAY: u64 = 86_400;
 
 /// What a measurement ran on.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Machine {
     /// Model of the first processor, as the kernel names it.
     pub cpu: String,

@@ -118,7 +118,7 @@ pub struct WorldReport {
     pub time_ns: u64,
     /// State hash of the last tick, chained over all.
     pub state_hash: u64,
-    /// Hard constraints in force at the end.
+    /// Hard constraints that came into force, each once for every time it did.
     pub hard_constraints: u64,
     /// Tasks reported as failed.
     pub task_failures: u64,

@@ -17,4 +17,4 @@ mod simulation;
 mod tables;
 
 pub use report::{RobotReport, SimReport};
-pub use simulation::{Observer, Simulation};
+pub use simulation::{Observer, Participant, Probe, Simulation};

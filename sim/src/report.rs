@@ -36,8 +36,6 @@ pub struct SimReport {
     pub robots: Vec<RobotReport>,
     /// Work done by the planner service.
     pub planner: Counters,
-    /// Hard constraints found: each that came into force, once for every time it did.
-    pub hard_constraints: u64,
 }
 
 impl SimReport {

@@ -10,8 +10,8 @@ use robot::{Robot, RobotInput};
 use scene::{Scene, Settings};
 use shm_types::capacity::MAX_ROBOTS;
 use shm_types::{
-    Checked, Command, ControlKind, ControlRequest, Counts, EventKind, HardAnswer, HardRequest,
-    Invalid, MotionBatch, Outcome, PlannerReport, RoleKind, Validate, WorldSnapshot, zeroed,
+    Checked, Command, ControlKind, ControlRequest, Counts, HardAnswer, HardRequest, Invalid,
+    MotionBatch, Outcome, PlannerReport, RoleKind, Validate, WorldSnapshot, zeroed,
 };
 use world::{FIRST_INCARNATION, World, WorldInput};
 
@@ -29,6 +29,31 @@ impl<F: FnMut(&WorldSnapshot, &MotionBatch) -> ControlFlow<()>> Observer for F {
     fn ticked(&mut self, snapshot: &WorldSnapshot, motion: &MotionBatch) -> ControlFlow<()> {
         self(snapshot, motion)
     }
+}
+
+/// Is told whose step begins, so that a caller with a clock can time the steps of each.
+pub trait Probe {
+    /// `who` is about to step.
+    fn enter(&mut self, who: Participant);
+    /// The tick is over.
+    fn leave(&mut self);
+}
+
+/// Nobody times the steps.
+impl Probe for () {
+    fn enter(&mut self, _who: Participant) {}
+    fn leave(&mut self) {}
+}
+
+/// Whoever steps in a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Participant {
+    /// The robot of this index.
+    Robot(usize),
+    /// The planner service.
+    Planner,
+    /// The world.
+    World,
 }
 
 /// World, planner and robots of one run. After construction a tick allocates nothing.
@@ -52,8 +77,6 @@ pub struct Simulation<'s> {
     answers: Vec<Option<HardAnswer>>,
     /// What the planner has published.
     tables: Tables,
-    /// Hard constraints that came into force so far.
-    constraints_found: u64,
     /// What the world is told in the next step.
     control: Vec<ControlRequest>,
     control_id: u64,
@@ -85,7 +108,6 @@ impl<'s> Simulation<'s> {
             staged: Vec::with_capacity(robots),
             answers: vec![None; robots],
             tables: Tables::new(),
-            constraints_found: 0,
             control: Vec::with_capacity(robots + 1),
             control_id: 0,
             settings: settings.clone(),
@@ -156,20 +178,32 @@ impl<'s> Simulation<'s> {
     /// # Panics
     /// When a machine makes a message that is no valid one: that is a bug.
     pub fn tick(&mut self) -> &WorldSnapshot {
+        self.tick_probed(&mut ())
+    }
+
+    /// As [`Self::tick`], telling `probe` who steps.
+    ///
+    /// # Panics
+    /// As [`Self::tick`].
+    pub fn tick_probed(&mut self, probe: &mut impl Probe) -> &WorldSnapshot {
         let units = self.settings.units_per_tick(self.snapshot.header.busy);
-        self.step_robots(units);
+        self.step_robots(units, probe);
+        probe.enter(Participant::Planner);
         self.step_planner(units);
+        probe.enter(Participant::World);
         self.step_world();
+        probe.leave();
         &self.snapshot
     }
 
-    fn step_robots(&mut self, units: u64) {
+    fn step_robots(&mut self, units: u64, probe: &mut impl Probe) {
         let counts = self.scene.counts();
         let snapshot = checked(&*self.snapshot, counts);
         let version = snapshot.header.epoch_constraints_version;
         let table = checked(self.tables.version(version), counts);
         self.asked.clear();
         for (id, robot) in self.robots.iter_mut().enumerate() {
+            probe.enter(Participant::Robot(id));
             let input = RobotInput {
                 snapshot,
                 table,
@@ -214,9 +248,6 @@ impl<'s> Simulation<'s> {
         self.world.step(self.scene, input, &mut self.motion);
         self.control.clear();
         self.world.snapshot_into(&mut self.snapshot);
-        let found = self.motion.events().iter();
-        let found = found.filter(|event| event.kind == EventKind::Constraint.code());
-        self.constraints_found += found.count() as u64;
     }
 
     /// What the machines know now.
@@ -239,23 +270,19 @@ impl<'s> Simulation<'s> {
             world: *self.world.counters(),
             robots: robots.collect(),
             planner: self.report.counters,
-            hard_constraints: self.constraints_found,
         }
     }
 
     fn reason(&self) -> Option<String> {
-        if let Some(violation) = self.world.violation() {
-            return Some(format!("{violation:?}"));
-        }
-        let stuck = self.world.stuck_reason(self.scene)?;
+        let reason = self.world.reason(self.scene)?;
         let cycle = self
             .robots
             .iter()
             .map(Robot::cycle)
             .find(|cycle| !cycle.is_empty());
         Some(match cycle {
-            Some(cycle) => format!("{stuck}; tasks wait for each other in a {}", Cycle(cycle)),
-            None => stuck.to_string(),
+            Some(cycle) => format!("{reason}; tasks wait for each other in a {}", Cycle(cycle)),
+            None => reason,
         })
     }
 }

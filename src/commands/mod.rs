@@ -18,7 +18,7 @@ use std::process::ExitCode;
 
 use tracing_subscriber::EnvFilter;
 
-use crate::cli::{Cli, Command, Workload};
+use crate::cli::{Cli, Command};
 use crate::exit::Outcome;
 use crate::output;
 
@@ -44,9 +44,7 @@ fn dispatch(command: Command) -> Outcome {
         Command::Validate(args) => validate::main(&args),
         Command::Scenarios(args) => scenarios::main(&args),
         Command::List(args) => list::main(&args),
-        Command::Bench(args) => match args.workload {
-            Workload::Speed(args) => bench::speed(&args),
-        },
+        Command::Bench(args) => bench::main(&args.workload),
         Command::World(args) => roles::main(node::Role::World, &args),
         Command::Planner(args) => roles::main(node::Role::Planner, &args),
         Command::Robot(args) => roles::main(node::Role::Robot(args.index), &args),

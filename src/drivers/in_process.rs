@@ -176,7 +176,7 @@ fn finished(report: SimReport) -> Finished {
             ticks: report.ticks,
             time_ns: report.time_ns,
             state_hash: report.state_hash,
-            hard_constraints: report.hard_constraints,
+            hard_constraints: report.world.constraints_found,
             task_failures: report.world.task_failures,
             grants_refused: report.world.grants_refused,
             selection_conflicts: report.world.selection_conflicts,

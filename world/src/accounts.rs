@@ -47,6 +47,8 @@ pub struct WorldCounters {
     pub selection_conflicts: u64,
     /// Failures counted (rule 21).
     pub task_failures: u64,
+    /// Hard constraints that came into force, each once for every time it did.
+    pub constraints_found: u64,
     /// Failures counted without the planner's answer, its deadline having passed.
     pub answers_missed: u64,
     /// Grips asked for that could not begin.

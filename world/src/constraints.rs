@@ -27,17 +27,21 @@ impl Constraints {
         }
     }
 
-    /// Tells what is new in the table in force, as far as this tick's batch has room.
-    fn tell(&mut self, journal: &mut Journal<'_>) {
+    /// Tells what is new in the table in force, as far as this tick's batch has room; how much
+    /// that was.
+    fn tell(&mut self, journal: &mut Journal<'_>) -> u64 {
+        let mut told = 0;
         while let Some(found) = self.in_force.constraints().get(self.next)
             && journal.has_room_for_constraints()
         {
             if self.before.constraints().binary_search(found).is_err() {
                 let event = Event::new(EventKind::Constraint).task(found.before as usize);
                 journal.event(event.other(found.after).value(u64::from(found.kind)));
+                told += 1;
             }
             self.next += 1;
         }
+        told
     }
 
     /// Adds the table, and how far it has been told.
@@ -82,7 +86,7 @@ impl World {
                 self.placed();
             }
         }
-        self.constraints.tell(journal);
+        self.counters.constraints_found += self.constraints.tell(journal);
     }
 }
 

@@ -48,5 +48,4 @@ mod wire;
 pub use accounts::{ActivityTimes, WorldCounters};
 pub use control::FIRST_INCARNATION;
 pub use invariants::Violation;
-pub use settled::StuckReason;
 pub use step::{World, WorldInput};

@@ -1,6 +1,6 @@
 //! How a run ends (rules 6, 22).
 //!
-//! Responsible for: solved, stuck, timed out, stopped; and what a stuck run is stuck on. Not
+//! Responsible for: solved, stuck, timed out, stopped, failed; and why. Not
 //! responsible for: invariants (`invariants.rs`).
 //!
 //! Terms: a robot is *settled* when its newest command says it has looked since the last change
@@ -19,19 +19,41 @@ use crate::step::World;
 /// in which nothing came of it.
 const SETTLED_TICKS: u32 = 2;
 
+/// More than a message has room for: what follows would not be the whole truth, so the run ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Overflow {
+    /// Events of one tick.
+    Events,
+    /// Hard constraints that the table had no room for.
+    Constraints(u32),
+}
+
+impl fmt::Display for Overflow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Events => f.write_str("one tick had more events than a batch has room for"),
+            Self::Constraints(dropped) => write!(
+                f,
+                "{dropped} hard constraints were found beyond the {} that a table has room for",
+                shm_types::capacity::MAX_CONSTRAINTS
+            ),
+        }
+    }
+}
+
 /// What a run is stuck on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct StuckReason {
+pub(crate) struct StuckReason {
     /// Tasks that nobody has claimed.
-    pub waiting: usize,
+    pub(crate) waiting: usize,
     /// Those of them barred for every live robot.
-    pub barred: usize,
+    pub(crate) barred: usize,
     /// Objects held by robots that cannot go on.
-    pub held: usize,
+    pub(crate) held: usize,
     /// Robots that carry nothing and are not at home.
-    pub away: usize,
+    pub(crate) away: usize,
     /// Robots that are gone.
-    pub gone: usize,
+    pub(crate) gone: usize,
 }
 
 impl fmt::Display for StuckReason {
@@ -48,7 +70,7 @@ impl fmt::Display for StuckReason {
 impl World {
     /// What a stuck run is stuck on; `None` unless the outcome is [`Outcome::Stuck`].
     #[must_use]
-    pub fn stuck_reason(&self, scene: &Scene) -> Option<StuckReason> {
+    pub(crate) fn stuck_reason(&self, scene: &Scene) -> Option<StuckReason> {
         if self.outcome != Outcome::Stuck {
             return None;
         }
@@ -72,6 +94,15 @@ impl World {
         Some(reason)
     }
 
+    /// Why the run ended as it did, where the outcome alone does not say.
+    #[must_use]
+    pub fn reason(&self, scene: &Scene) -> Option<String> {
+        let violation = || self.violation().map(|found| format!("{found:?}"));
+        let overflow = || self.overflow.map(|found| found.to_string());
+        let stuck = || self.stuck_reason(scene).map(|stuck| stuck.to_string());
+        violation().or_else(overflow).or_else(stuck)
+    }
+
     /// How the run stands after this tick.
     pub(crate) fn judge_outcome(
         &mut self,
@@ -83,7 +114,7 @@ impl World {
         self.settled_ticks = if quiet { self.settled_ticks + 1 } else { 0 };
         if self.counters.violations > 0 {
             Outcome::Violated
-        } else if self.overflowed {
+        } else if self.overflow.is_some() {
             Outcome::Failed
         } else if self.is_solved(scene) {
             Outcome::Solved
@@ -248,6 +279,18 @@ mod tests {
         let reason = bench.world.stuck_reason(&bench.scene).unwrap();
         assert_eq!((reason.gone, reason.waiting, reason.barred), (1, 1, 1));
         assert!(reason.to_string().contains("1 robots are gone"), "{reason}");
+    }
+
+    #[test]
+    fn constraints_without_room_end_the_run_since_it_would_no_longer_be_the_method() {
+        let mut bench = bench();
+        bench.step();
+        assert_eq!(bench.world.outcome(), Outcome::Running);
+        bench.planner.constraints_dropped = 3;
+        bench.step();
+        assert_eq!(bench.world.outcome(), Outcome::Failed);
+        let reason = bench.world.reason(&bench.scene).unwrap();
+        assert!(reason.starts_with("3 hard constraints"), "{reason}");
     }
 
     #[test]

@@ -19,6 +19,7 @@ use crate::grants::{Grants, Surroundings};
 use crate::invariants::Violation;
 use crate::journal::{Event, Journal};
 use crate::motion::{self, Span};
+use crate::settled::Overflow;
 use crate::state::{Object, Robot};
 use crate::track::Track;
 
@@ -55,7 +56,7 @@ pub struct World {
     pub(crate) busy: u32,
     pub(crate) held: bool,
     pub(crate) stopped: bool,
-    pub(crate) overflowed: bool,
+    pub(crate) overflow: Option<Overflow>,
     pub(crate) settled_ticks: u32,
     pub(crate) outcome: Outcome,
     pub(crate) violation: Option<Violation>,
@@ -95,7 +96,7 @@ impl World {
             busy: 0,
             held: false,
             stopped: false,
-            overflowed: false,
+            overflow: None,
             settled_ticks: 0,
             outcome: Outcome::Running,
             violation: None,
@@ -203,7 +204,7 @@ impl World {
         journal: &mut Journal<'_>,
     ) {
         let eventful = journal.is_eventful();
-        self.overflowed |= journal.overflowed();
+        self.note_overflow(planner, journal);
         self.schedule_version = planner.map_or(self.schedule_version, |p| p.schedule_version);
         let outcome = self.judge_outcome(scene, planner, eventful);
         self.epoch.change += u64::from(eventful);
@@ -215,6 +216,13 @@ impl World {
             journal.event(event.value(u64::from(outcome.code())));
         }
         journal.finish(self.tick, self.time_ns);
+    }
+
+    fn note_overflow(&mut self, planner: Option<&PlannerReport>, journal: &Journal<'_>) {
+        let dropped = planner.map_or(0, |report| report.constraints_dropped);
+        let events = journal.overflowed().then_some(Overflow::Events);
+        let constraints = (dropped > 0).then_some(Overflow::Constraints(dropped));
+        self.overflow = self.overflow.or(events).or(constraints);
     }
 
     /// How the run stands.

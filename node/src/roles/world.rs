@@ -219,8 +219,6 @@ impl Shell {
     fn report(&self, seat: &Seat) -> WorldReport {
         let world = &self.world;
         let counters = world.counters();
-        let stuck = world.stuck_reason(&seat.scene).map(|why| why.to_string());
-        let violated = || world.violation().map(|violation| format!("{violation:?}"));
         let activities = (0..seat.run.robots as usize).map(|robot| {
             let mut report = ActivityReport::default();
             for activity in Activity::ALL {
@@ -230,11 +228,11 @@ impl Shell {
         });
         WorldReport {
             outcome: world.outcome().code(),
-            reason: stuck.or_else(violated),
+            reason: world.reason(&seat.scene),
             ticks: self.tick,
             time_ns: self.tick * seat.options().settings.tick_ns,
             state_hash: world.state_hash(),
-            hard_constraints: self.ears.constraints(),
+            hard_constraints: counters.constraints_found,
             task_failures: counters.task_failures,
             grants_refused: counters.grants_refused,
             selection_conflicts: counters.selection_conflicts,

@@ -186,12 +186,6 @@ impl Ears {
         self.tables.newest()
     }
 
-    /// How many hard constraints it holds.
-    pub(super) fn constraints(&self) -> u64 {
-        let table = self.tables.newest().ok().flatten();
-        table.map_or(0, |table| u64::from(table.count))
-    }
-
     /// Commands that never came, or were no legal ones.
     pub(super) const fn lost_commands(&self) -> u64 {
         self.lost_commands

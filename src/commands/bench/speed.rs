@@ -1,4 +1,4 @@
-//! `rearrange bench`: how fast this machine runs a scenario.
+//! `rearrange bench speed`: how fast this machine runs a scenario.
 //!
 //! Responsible for: handing real processes to the workload, printing what it measured.
 //! Not responsible for: the measurement (crate `bench`).
@@ -15,7 +15,7 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::{output, scenario, table};
 
 /// Measures world time per wall time with both drivers.
-pub(crate) fn speed(args: &SpeedArgs) -> Outcome {
+pub(crate) fn main(args: &SpeedArgs) -> Outcome {
     let scene = scenario::load(&args.scenario, args.robots)?.scene;
     if let Some(proof) = planner::certificate(&scene) {
         let message = format!("{} cannot be solved: {proof}", scene.name);
