@@ -168,6 +168,70 @@ pub(crate) struct BenchArgs {
 pub(crate) enum Workload {
     /// World time per wall time: in process, and in lockstep with one process per robot
     Speed(SpeedArgs),
+    /// The paper's experiment: rooms × robots × methods, and whether its directions hold
+    Paper(PaperArgs),
+    /// Two results: ratios with intervals, and status 1 where something got worse
+    Compare(CompareArgs),
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = format!("\
+Modelled times count work units at a stated speed and are the same on every machine; wall times of
+the same steps stand beside them.
+
+Examples:
+  rearrange bench paper --quick
+  rearrange bench paper --rooms 300 --units-per-second 100000,1000000 --out results/
+
+{STATUSES}"))]
+pub(crate) struct PaperArgs {
+    /// The paper's rooms and a few seeded ones, at two speeds: less than a minute
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Seeded rooms beside the paper's six [default: 100, with --quick 6]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    pub(crate) rooms: Option<u32>,
+    /// Seed of the first seeded room
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Numbers of robots [default: 1,2,3,4]
+    #[arg(long, value_name = "M,…", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=4))]
+    pub(crate) robots: Vec<u32>,
+    /// Modelled speeds, work units a second [default: 10000,100000,1000000,10000000]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = clap::value_parser!(u64).range(1..=1_000_000_000_000))]
+    pub(crate) units_per_second: Vec<u64>,
+    /// Whose computer it is: own, shared or both [default: own,shared]
+    #[arg(long, value_name = "WORD,…", value_delimiter = ',', value_parser = compute)]
+    pub(crate) compute: Vec<scene::Compute>,
+    /// Make each run so often: modelled times repeat, wall times spread
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000))]
+    pub(crate) repeats: u32,
+    /// All machines in one process, or one process per robot in lockstep
+    #[arg(long, value_enum, default_value = "in-process")]
+    pub(crate) driver: crate::run_options::Driver,
+    #[command(flatten)]
+    pub(crate) output: OutputArgs,
+}
+
+/// Parses whose computer it is, for clap.
+fn compute(text: &str) -> Result<scene::Compute, String> {
+    text.parse::<scene::Compute>()
+        .map_err(|unknown| unknown.to_string())
+}
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  rearrange bench compare before/ after/\n\nStatus 1 where something \
+                        got worse beyond the noise, 0 where nothing did."
+)]
+pub(crate) struct CompareArgs {
+    /// The result before: a directory of results, or its results.json
+    pub(crate) a: PathBuf,
+    /// The result after
+    pub(crate) b: PathBuf,
+    /// List what stayed the same too
+    #[arg(long)]
+    pub(crate) all: bool,
 }
 
 #[derive(Debug, Args)]

@@ -14,6 +14,8 @@ use crate::output;
 pub(crate) enum Exit {
     /// Solved, valid, clean: what was asked for is so.
     Success = 0,
+    /// Something got worse (`bench compare`).
+    Worse = 1,
     /// The command line is wrong.
     Usage = 2,
     /// The scenario or trace is unreadable, malformed or contradicts itself.
@@ -34,6 +36,7 @@ pub(crate) enum Exit {
 pub(crate) const STATUSES: &str = "\
 Exit status:
   0    solved (check: no violation; validate: nothing wrong)
+  1    bench compare: something got worse beyond the noise
   2    the command line is wrong
   3    bad scenario, or a trace that cannot be read
   4    infeasible: proved, with the reason

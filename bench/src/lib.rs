@@ -4,9 +4,11 @@
 //! were measured on.
 //! Not responsible for: command lines or printing (the binary), or what is correct (tests).
 
+pub mod compare;
 pub mod figure;
 pub mod files;
 pub mod machine;
+pub mod paper;
 pub mod progress;
 pub mod report;
 pub mod results;

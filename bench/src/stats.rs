@@ -63,7 +63,7 @@ pub fn median_interval(sample: &[f64]) -> Option<Estimate> {
     interval(sample, median)
 }
 
-fn interval(sample: &[f64], statistic: impl Fn(&[f64]) -> Option<f64>) -> Option<Estimate> {
+fn interval<T: Copy>(sample: &[T], statistic: impl Fn(&[T]) -> Option<f64>) -> Option<Estimate> {
     let value = statistic(sample)?;
     let mut draw = Draw::new();
     let resamples: Vec<_> = (0..RESAMPLES)
@@ -96,6 +96,18 @@ pub fn ratio_interval(over: &[f64], under: &[f64]) -> Option<Estimate> {
     })
 }
 
+/// Ratio of the means of pairs, first by second, with its interval over resampled pairs; none
+/// without a pair or if the second mean is not positive.
+#[must_use]
+pub fn ratio_of_means_interval(pairs: &[(f64, f64)]) -> Option<Estimate> {
+    let ratio = |pairs: &[(f64, f64)]| {
+        let over: f64 = pairs.iter().map(|pair| pair.0).sum();
+        let under: f64 = pairs.iter().map(|pair| pair.1).sum();
+        (under > 0.0).then(|| over / under)
+    };
+    interval(pairs, ratio)
+}
+
 /// Exponent b of y = a·xᵇ through the points, by least squares of the logarithms, with its
 /// interval over resampled points; points that are not positive do not count. None of fewer than
 /// two different x.
@@ -106,16 +118,7 @@ pub fn growth_exponent(points: &[(f64, f64)]) -> Option<Estimate> {
         .filter(|(x, y)| *x > 0.0 && *y > 0.0)
         .map(|(x, y)| (x.ln(), y.ln()))
         .collect();
-    let value = slope(&logs)?;
-    let mut draw = Draw::new();
-    let resamples: Vec<_> = (0..RESAMPLES)
-        .filter_map(|_| slope(&draw.of(&logs)))
-        .collect();
-    Some(Estimate {
-        value,
-        low: quantile(&resamples, OUTSIDE / 2.0)?,
-        high: quantile(&resamples, 1.0 - OUTSIDE / 2.0)?,
-    })
+    interval(&logs, slope)
 }
 
 fn slope(points: &[(f64, f64)]) -> Option<f64> {

@@ -4,6 +4,8 @@
 //! terminal, Ctrl-C, what is printed at the end.
 //! Not responsible for: the measurements (crate `bench`).
 
+mod compare;
+mod paper;
 mod speed;
 
 use std::path::{Path, PathBuf};
@@ -22,11 +24,12 @@ use crate::output;
 pub(crate) fn main(workload: &Workload) -> Outcome {
     match workload {
         Workload::Speed(args) => speed::main(args),
+        Workload::Paper(args) => paper::main(args),
+        Workload::Compare(args) => compare::main(args),
     }
 }
 
 /// The command line as it was typed, to stand in results.
-#[expect(dead_code, reason = "for workloads that leave files")]
 pub(crate) fn command_line() -> String {
     let arguments = std::env::args().skip(1);
     std::iter::once("rearrange".to_owned())
@@ -42,7 +45,6 @@ pub(crate) struct Destination {
     json: bool,
 }
 
-#[expect(dead_code, reason = "for workloads that leave files")]
 impl Destination {
     /// Makes the directory, before anything is measured.
     ///
@@ -94,7 +96,6 @@ pub(crate) struct Watch {
     interrupt: Interrupt,
 }
 
-#[expect(dead_code, reason = "for workloads that leave files")]
 impl Watch {
     /// # Errors
     /// Signals cannot be watched.
