@@ -147,11 +147,13 @@ pub enum RoomError {
     },
 }
 
-/// The rooms of a plan: the paper's six, then the seeded ones, their floors in turn.
+/// The rooms of a plan: the paper's six, then the seeded ones, their floors in turn; fewer if
+/// somebody interrupts.
 ///
 /// # Errors
 /// A room cannot be made.
-pub fn rooms(plan: &Plan) -> Result<Vec<Room>, RoomError> {
+pub fn rooms(plan: &Plan, progress: &mut dyn Progress) -> Result<Vec<Room>, RoomError> {
+    progress.begin((PAPER_ROOMS.len() + plan.rooms) as u64);
     let shipped = PAPER_ROOMS.iter().enumerate().map(|(index, name)| {
         let unread = || RoomError::Shipped {
             name: (*name).to_owned(),
@@ -165,7 +167,13 @@ pub fn rooms(plan: &Plan) -> Result<Vec<Room>, RoomError> {
         })
     });
     let seeded = (0..plan.rooms).map(|index| seeded_room(plan.seed + index as u64, index));
-    shipped.chain(seeded).collect()
+    shipped
+        .chain(seeded)
+        .take_while(|_| {
+            progress.step("making the rooms");
+            !progress.is_interrupted()
+        })
+        .collect()
 }
 
 fn seeded_room(seed: u64, index: usize) -> Result<Room, RoomError> {

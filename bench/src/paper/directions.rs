@@ -19,6 +19,9 @@ use crate::stats::{Estimate, mean, ratio_of_means_interval};
 /// Times this close are similar: within a tenth.
 const SIMILAR: f64 = 1.1;
 
+/// Name of the table with a row for each comparison.
+pub const DIRECTIONS_TABLE: &str = "directions";
+
 const PAPERS: &str = "grasping-and-restricted";
 
 /// What identifies a run but for its method.
@@ -45,8 +48,17 @@ struct Direction {
 
 /// One comparison.
 struct Verdict {
-    words: String,
+    comparison: String,
+    numbers: String,
     held: Option<bool>,
+}
+
+/// Rooms, computer and modelled speed of a group of runs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct World {
+    set: String,
+    compute: String,
+    units_per_second: String,
 }
 
 const DIRECTIONS: [Direction; 7] = [
@@ -112,39 +124,90 @@ const DIRECTIONS: [Direction; 7] = [
     },
 ];
 
-/// What the runs say of every direction, one finding for each set of rooms and modelled speed.
+/// What the runs say of every direction: one finding for each set of rooms, and a row for each
+/// comparison behind it. A finding holds if it does at every modelled speed; its evidence says
+/// where it turns.
 #[must_use]
-pub fn findings(table: &Table) -> Vec<Finding> {
+pub fn judge(table: &Table) -> (Vec<Finding>, Table) {
     let worlds = worlds(table);
-    let mut findings = Vec::new();
+    let mut rows = comparisons();
+    let mut findings: Vec<Finding> = Vec::new();
     for direction in &DIRECTIONS {
         for (world, runs) in &worlds {
             let verdicts = (direction.judge)(runs);
             let known: Vec<_> = verdicts.iter().filter_map(|verdict| verdict.held).collect();
-            let words: Vec<_> = verdicts.into_iter().map(|verdict| verdict.words).collect();
-            findings.push(Finding {
-                claim: format!("{world}: {}", direction.claim),
-                held: (!known.is_empty()).then(|| known.iter().all(|held| *held)),
-                evidence: words.join("; "),
-            });
+            let held = (!known.is_empty()).then(|| known.iter().all(|held| *held));
+            for verdict in verdicts {
+                rows.push(vec![
+                    direction.claim.into(),
+                    world.set.as_str().into(),
+                    world.compute.as_str().into(),
+                    world.units_per_second.as_str().into(),
+                    verdict.comparison.into(),
+                    verdict.held.map(word).into(),
+                    verdict.numbers.into(),
+                ]);
+            }
+            let claim = format!("{} rooms: {}", world.set, direction.claim);
+            let place = format!("{}, {} units/s", world.compute, world.units_per_second);
+            let place = format!("{place}: {}", held.map_or("not measured", word));
+            match findings.iter_mut().find(|finding| finding.claim == claim) {
+                Some(finding) => {
+                    finding.held = match (finding.held, held) {
+                        (Some(one), Some(other)) => Some(one && other),
+                        (one, other) => one.or(other),
+                    };
+                    finding.evidence += &format!("; {place}");
+                }
+                None => findings.push(Finding {
+                    claim,
+                    held,
+                    evidence: place,
+                }),
+            }
         }
     }
-    findings
+    (findings, rows)
+}
+
+const fn word(held: bool) -> &'static str {
+    if held { "held" } else { "did not hold" }
+}
+
+fn comparisons() -> Table {
+    Table::new(
+        DIRECTIONS_TABLE,
+        "The paper's directions, comparison by comparison",
+    )
+    .key("direction", "", "what the paper says")
+    .key("set", "", "the paper's six rooms, or seeded ones")
+    .key(
+        "compute",
+        "",
+        "one computer each (own), or one for all (shared)",
+    )
+    .key("units_per_second", "1/s", "modelled speed of a computer")
+    .key("comparison", "", "what is compared")
+    .info("held", "", "whether the numbers bear it out")
+    .info(
+        "numbers",
+        "",
+        "ratio with its 95 % interval over the pairs, or values by robots",
+    )
 }
 
 /// The runs by set of rooms, computer and modelled speed.
-fn worlds(table: &Table) -> Vec<(String, Runs)> {
-    let mut worlds: Vec<(String, Runs)> = Vec::new();
+fn worlds(table: &Table) -> Vec<(World, Runs)> {
+    let mut worlds: Vec<(World, Runs)> = Vec::new();
     for row in &table.rows {
         let text = |name: &str| cell(table, row, name).to_string();
-        let world = format!(
-            "{} rooms, {} computer, {} units/s",
-            text("set"),
-            text("compute"),
-            text("units_per_second")
-        );
+        let world = World {
+            set: text("set"),
+            compute: text("compute"),
+            units_per_second: text("units_per_second"),
+        };
         let Some(run) = run(table, row) else { continue };
-        let place = worlds.iter().position(|(name, _)| *name == world);
+        let place = worlds.iter().position(|(other, _)| *other == world);
         let place = place.unwrap_or_else(|| {
             worlds.push((world, Runs::new()));
             worlds.len() - 1
@@ -190,30 +253,35 @@ fn ratio(runs: &Runs, one: &str, other: &str, of: fn(&Run) -> f64) -> Option<(Es
     Some((ratio_of_means_interval(&pairs)?, pairs.len()))
 }
 
-fn words(what: &str, one: &str, other: &str, found: Option<(Estimate, usize)>) -> String {
-    match found {
-        Some((ratio, pairs)) => format!(
-            "{what} {one} / {other} = {:.3} [{:.3}, {:.3}] over {pairs} pairs",
-            ratio.value, ratio.low, ratio.high
+fn compared(
+    what: &str,
+    (one, other): (&str, &str),
+    found: Option<(Estimate, usize)>,
+    holds: impl Fn(Estimate) -> bool,
+) -> Verdict {
+    Verdict {
+        comparison: format!("{what}: {one} / {other}"),
+        numbers: found.map_or_else(
+            || "no pair to compare".to_owned(),
+            |(ratio, pairs)| {
+                let Estimate { value, low, high } = ratio;
+                format!("{value:.3} [{low:.3}, {high:.3}] over {pairs} pairs")
+            },
         ),
-        None => format!("{what} {one} / {other}: no pair to compare"),
+        held: found.map(|(ratio, _)| holds(ratio)),
     }
 }
 
 fn less(runs: &Runs, one: &str, other: &str, what: &str, of: fn(&Run) -> f64) -> Verdict {
     let found = ratio(runs, one, other, of);
-    Verdict {
-        words: words(what, one, other, found),
-        held: found.map(|(ratio, _)| ratio.high < 1.0),
-    }
+    compared(what, (one, other), found, |ratio| ratio.high < 1.0)
 }
 
 fn similar(runs: &Runs, other: &str, what: &str, of: fn(&Run) -> f64) -> Verdict {
     let found = ratio(runs, PAPERS, other, of);
-    Verdict {
-        words: words(what, PAPERS, other, found),
-        held: found.map(|(ratio, _)| ratio.low > 1.0 / SIMILAR && ratio.high < SIMILAR),
-    }
+    compared(what, (PAPERS, other), found, |ratio| {
+        ratio.low > 1.0 / SIMILAR && ratio.high < SIMILAR
+    })
 }
 
 fn solves_least(runs: &Runs) -> Verdict {
@@ -235,7 +303,8 @@ fn solves_least(runs: &Runs) -> Verdict {
         .map(|(method, share)| format!("{method} {:.0} %", share * 100.0))
         .collect();
     Verdict {
-        words: format!("solved: {}", words.join(", ")),
+        comparison: "runs that end solved".to_owned(),
+        numbers: words.join(", "),
         held: of("no-action")
             .zip(least)
             .map(|((_, share), least)| *share < least),
@@ -272,7 +341,8 @@ fn rises(points: &[(f64, f64)]) -> Option<bool> {
 fn grows(runs: &Runs, method: &str, of: fn(&Run) -> f64) -> Verdict {
     let points = by_robots(runs, method, of);
     Verdict {
-        words: format!("{method}, s (robots): {}", series(&points)),
+        comparison: format!("{method}, s (robots)"),
+        numbers: series(&points),
         held: rises(&points),
     }
 }
@@ -288,7 +358,8 @@ fn gap_grows(runs: &Runs, other: &str) -> Verdict {
         })
         .collect();
     Verdict {
-        words: format!("{other} less the paper's, s (robots): {}", series(&gaps)),
+        comparison: format!("{other} less the paper's, s (robots)"),
+        numbers: series(&gaps),
         held: rises(&gaps),
     }
 }
@@ -347,7 +418,7 @@ mod tests {
             "restricted" => 2.0 * robots as f64,
             _ => 5.0 * robots as f64,
         };
-        let findings = findings(&table(planning, "no-action"));
+        let (findings, _) = judge(&table(planning, "no-action"));
         assert_eq!(findings.len(), DIRECTIONS.len());
         for finding in &findings {
             assert_eq!(finding.held, Some(true), "{finding:?}");
@@ -360,7 +431,7 @@ mod tests {
             PAPERS => 9.0 / robots as f64,
             _ => 2.0,
         };
-        let findings = findings(&table(planning, "restricted"));
+        let (findings, _) = judge(&table(planning, "restricted"));
         assert_eq!(held(&findings, "planning is least"), Some(false));
         assert_eq!(held(&findings, "planning grows"), Some(false));
         assert_eq!(held(&findings, "no-action is worst"), Some(false));
@@ -368,8 +439,42 @@ mod tests {
     }
 
     #[test]
+    fn one_speed_at_which_it_turns_is_enough_not_to_hold_and_is_named() {
+        let mut runs = table(
+            |method, robots| if method == PAPERS { 1.0 } else { 2.0 } * robots as f64,
+            "no-action",
+        );
+        let mut slow = table(
+            |method, robots| if method == PAPERS { 3.0 } else { 2.0 } * robots as f64,
+            "no-action",
+        );
+        let speed = runs.position("units_per_second").unwrap();
+        for row in &mut slow.rows {
+            row[speed] = 5u64.into();
+        }
+        runs.rows.append(&mut slow.rows);
+        let (findings, rows) = judge(&runs);
+        let least = findings
+            .iter()
+            .find(|finding| finding.claim.contains("planning is least"))
+            .unwrap();
+        assert_eq!(least.held, Some(false));
+        assert_eq!(
+            least.evidence,
+            "own, 10 units/s: held; own, 5 units/s: did not hold"
+        );
+        assert_eq!(
+            rows.rows
+                .iter()
+                .filter(|row| row[0].to_string().contains("planning is least"))
+                .count(),
+            8
+        );
+    }
+
+    #[test]
     fn nothing_to_compare_decides_nothing() {
-        let findings = findings(&table(|_, _| 1.0, PAPERS));
+        let (findings, _) = judge(&table(|_, _| 1.0, PAPERS));
         assert_eq!(held(&findings, "planning is least"), None);
     }
 }

@@ -21,17 +21,18 @@ use crate::table;
 pub(crate) fn main(args: &PaperArgs) -> Outcome {
     let destination = Destination::create("paper", &args.output)?;
     let plan = plan(args);
-    let rooms = paper::rooms(&plan).map_err(Failure::system)?;
-    let mut results = Results::new("paper", &command_line());
     let mut watch = Watch::start()?;
+    let rooms = paper::rooms(&plan, &mut watch).map_err(Failure::system)?;
+    let mut results = Results::new("paper", &command_line());
     let mut run = |scene: &Scene, settings: &Settings| match args.driver {
         Driver::InProcess => Ok(in_process(scene, settings)),
         Driver::Processes => processes(scene, settings),
     };
     paper::measure(&plan, &rooms, &mut results, &mut watch, &mut run);
     drop(watch);
-    if let Some(runs) = paper::runs(&results) {
-        results.findings = directions::findings(runs);
+    if let Some((findings, comparisons)) = paper::runs(&results).map(directions::judge) {
+        results.findings = findings;
+        results.tables.push(comparisons);
     }
     let figures = figures::all(&results).map_err(Failure::system)?;
     destination.finish(&results, &figures, &[], &text(&results))
@@ -97,6 +98,36 @@ fn measures(report: &RunReport, tick_ns: u64) -> Measures {
     }
 }
 
+/// Every direction with where it held, and the comparisons behind it.
+fn findings(results: &Results) -> String {
+    let mut text = String::new();
+    for finding in &results.findings {
+        let word = match finding.held {
+            Some(true) => "held",
+            Some(false) => "did not hold",
+            None => "not measured",
+        };
+        text += &format!("{word}: {}\n    {}\n", finding.claim, finding.evidence);
+    }
+    let comparisons = results.table(directions::DIRECTIONS_TABLE);
+    let rows = comparisons.map_or(&[][..], |table| &table.rows);
+    let mut direction = String::new();
+    for row in rows {
+        let cells: Vec<_> = row.iter().map(ToString::to_string).collect();
+        let [claim, set, compute, speed, comparison, held, numbers] = cells.as_slice() else {
+            continue;
+        };
+        if *claim != direction {
+            text += &format!("\n{claim}\n");
+            direction.clone_from(claim);
+        }
+        text += &format!(
+            "    {set} rooms, {compute}, {speed} units/s: {comparison} = {numbers}: {held}\n"
+        );
+    }
+    text
+}
+
 /// Success and mean times of each method, and the directions.
 fn text(results: &Results) -> String {
     let mut text = String::new();
@@ -133,13 +164,6 @@ fn text(results: &Results) -> String {
         text += &table::finish(&table);
         text += "Means over solved runs of all rooms, robots and modelled speeds.\n\n";
     }
-    for finding in &results.findings {
-        let word = match finding.held {
-            Some(true) => "held",
-            Some(false) => "did not hold",
-            None => "not measured",
-        };
-        text += &format!("{word}: {}\n    {}\n", finding.claim, finding.evidence);
-    }
+    text += &findings(results);
     text
 }
