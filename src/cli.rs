@@ -37,6 +37,8 @@ pub(crate) enum Command {
     Run(Box<RunArgs>),
     /// Replay a trace with independent geometry and report what it violates
     Check(CheckArgs),
+    /// Make a page that plays a trace, or a still of it
+    View(ViewArgs),
     /// Make a random room that is certain to have a solution
     Generate(GenerateArgs),
     /// Print the JSON Schema of scenario files
@@ -86,6 +88,40 @@ pub(crate) struct CheckArgs {
     /// Print the report as one JSON object
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(
+    group(clap::ArgGroup::new("outputs").args(["output", "svg"]).required(true).multiple(true)),
+    after_help = format!("\
+The page is one file that needs no other and no network. It plays, scrubs and zooms; its keys are
+listed on it. The still shows where everything is at one time and the ways that led there.
+
+Example:
+  rearrange run --trace run.mcap && rearrange view run.mcap -o replay.html --svg still.svg
+
+{STATUSES}")
+)]
+pub(crate) struct ViewArgs {
+    /// Trace written by `rearrange run --trace`
+    #[arg(value_name = "TRACE.mcap")]
+    pub(crate) trace: PathBuf,
+    /// Write a page that plays the run; `-` is stdout
+    #[arg(long, short, value_name = "FILE.html")]
+    pub(crate) output: Option<PathBuf>,
+    /// Write a still with the ways of robots and objects; `-` is stdout
+    #[arg(long, value_name = "FILE.svg")]
+    pub(crate) svg: Option<PathBuf>,
+    /// World time of the still, and where the page opens, s [default: the end, the start]
+    #[arg(long, value_name = "S", value_parser = number(0.0, 1e9))]
+    pub(crate) at: Option<f64>,
+}
+
+impl ViewArgs {
+    /// Whether both outputs would go to one place.
+    pub(crate) fn clash(&self) -> bool {
+        self.output.is_some() && self.output == self.svg
+    }
 }
 
 #[derive(Debug, Args)]

@@ -12,6 +12,7 @@ mod run;
 mod scenarios;
 mod schema;
 mod validate;
+mod view;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -39,6 +40,7 @@ fn dispatch(command: Command) -> Outcome {
     match command {
         Command::Run(args) => run::main(&args),
         Command::Check(args) => check::main(&args),
+        Command::View(args) => view::main(&args),
         Command::Generate(args) => generate::main(&args),
         Command::Schema => schema::main(),
         Command::Validate(args) => validate::main(&args),

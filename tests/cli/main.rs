@@ -10,6 +10,7 @@ mod runs;
 mod streams;
 mod traces;
 mod usage;
+mod views;
 
 use assert_cmd::Command;
 use assert_cmd::assert::Assert;

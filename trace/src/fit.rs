@@ -6,7 +6,7 @@
 //! Not responsible for: whether the run they tell of is a legal one (`check`).
 
 use nalgebra::Vector2;
-use shm_types::capacity::{MAX_OBJECTS, MAX_ROBOTS};
+use shm_types::capacity::{MAX_OBJECTS, MAX_PATH_POINTS, MAX_ROBOTS};
 
 use crate::record::{BodyKind, ObjectNow};
 use crate::record::{
@@ -225,10 +225,15 @@ pub(crate) fn state(state: &State, scene: &SceneRecord) -> Fit {
         at,
         task: claimed,
         holding,
+        grant,
         ..
     } in &state.robots
     {
         place("place", *at)?;
+        most("granted corners", grant.len(), MAX_PATH_POINTS)?;
+        grant
+            .iter()
+            .try_for_each(|corner| place("granted corner", *corner))?;
         claimed.map_or(Ok(()), |claimed| task(claimed, scene))?;
         holding.map_or(Ok(()), |held| task(held, scene))?;
     }

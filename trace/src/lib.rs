@@ -1,7 +1,7 @@
 //! MCAP traces and the independent checker.
 //!
-//! Responsible for: writing what happened in a run, reading it back, whole or cut short, and
-//! checking that it was legal with geometry of its own.
+//! Responsible for: writing what happened in a run, reading it back, whole or cut short, checking
+//! that it was legal with geometry of its own, and showing it: as a page that plays it, as a still.
 //! Not responsible for: the run itself; where batches of motion come from.
 //!
 //! A trace is exact, not sampled: every body's motion is a list of straight pieces at constant
@@ -18,6 +18,7 @@ mod reader;
 pub mod record;
 mod replay;
 mod scene_record;
+mod view;
 mod wire;
 mod writer;
 
@@ -26,4 +27,5 @@ pub use fit::Unfit;
 pub use reader::{Close, ReadError, Reader, Span};
 pub use record::SceneRecord;
 pub use replay::{Frame, Replay};
+pub use view::{Story, page, still};
 pub use writer::{Ending, WriteError, Writer};

@@ -105,6 +105,7 @@ pub(crate) fn state(snapshot: Checked<'_, WorldSnapshot>) -> Result<State, Inval
             holding: index(robot.holding),
             phase: shm_types::Phase::decode(robot.phase)?.into(),
             activity: shm_types::Activity::decode(robot.activity)?.into(),
+            grant: robot.grant().iter().map(|&corner| corner.into()).collect(),
         })
     };
     let object = |object: &shm_types::ObjectState| {

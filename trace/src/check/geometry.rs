@@ -19,11 +19,11 @@ use crate::record::Outline;
 const EDGE_M: f64 = 1e-9;
 
 /// A point, an offset or a direction; m.
-pub(super) type Vector = Vector2<f64>;
+pub(crate) type Vector = Vector2<f64>;
 
 /// A convex shape: the hull of its corners with a disc of `radius` around every point of it.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Solid {
+pub(crate) struct Solid {
     corners: Vec<Vector>,
     radius: f64,
 }
@@ -57,7 +57,7 @@ impl From<&Outline> for Solid {
 
 impl Solid {
     /// Lower left and upper right corner of the box around it.
-    pub(super) fn extent(&self) -> (Vector, Vector) {
+    pub(crate) fn extent(&self) -> (Vector, Vector) {
         let around = Vector::new(self.radius, self.radius);
         let low = self
             .corners
@@ -82,18 +82,18 @@ struct Side {
 
 /// All places of one body's origin, relative to another's, at which the two meet.
 #[derive(Clone, Debug)]
-pub(super) struct Meeting {
+pub(crate) struct Meeting {
     sides: Vec<Side>,
     corners: Vec<Vector>,
     radius: f64,
 }
 
 /// Part of a straight motion, from 0 at its start to 1 at its end.
-pub(super) type Interval = (f64, f64);
+pub(crate) type Interval = (f64, f64);
 
 impl Meeting {
     /// Where `moving` meets `standing`.
-    pub(super) fn of(moving: &Solid, standing: &Solid) -> Self {
+    pub(crate) fn of(moving: &Solid, standing: &Solid) -> Self {
         let differences = standing
             .corners
             .iter()
@@ -126,7 +126,7 @@ impl Meeting {
 
     /// When a motion of the origin from `from` to `to` is nearer to the other body than
     /// `distance`. A negative distance asks when it is deeper inside than that.
-    pub(super) fn nearer_than(&self, distance: f64, from: Vector, to: Vector) -> Option<Interval> {
+    pub(crate) fn nearer_than(&self, distance: f64, from: Vector, to: Vector) -> Option<Interval> {
         let reach = self.radius + distance;
         let line = Line {
             from,

@@ -12,7 +12,7 @@ mod checker;
 mod ending;
 mod events;
 mod gap;
-mod geometry;
+pub(crate) mod geometry;
 mod grid;
 mod pairs;
 mod report;

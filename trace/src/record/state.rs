@@ -61,7 +61,7 @@ word! {
 }
 
 /// One robot in a `state` record.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotNow {
     /// Its centre.
     pub at: Place,
@@ -73,6 +73,10 @@ pub struct RobotNow {
     pub phase: Phase,
     /// What it did in the tick before.
     pub activity: Activity,
+    /// Corners of the path granted to it and still ahead: `at`, then these, is the way it will
+    /// move. Left out where nothing is granted.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub grant: Vec<Place>,
 }
 
 /// One object in a `state` record.

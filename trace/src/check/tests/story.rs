@@ -170,6 +170,7 @@ impl Story {
             holding: hold.filter(|_| id == 0),
             phase: Phase::Idle,
             activity: Activity::Idle,
+            grant: Vec::new(),
         };
         let object = |(id, at): (usize, &Vector2<f64>)| ObjectNow {
             at: (*at).into(),
