@@ -785,10 +785,5 @@ window.replay = {
   robots: () => data.robots.map((_, i) => ({ at: robotAt(i, state.t), ...robotDoing(i, state.t), grant: grantAt(i, state.t) })),
   objects: () => data.things.map((_, i) => ({ at: objectAt(i, state.t), ...taskDoing(i, state.t) })),
   unmet: () => unmetAt(state.t),
-  /** What is painted at a place in the room: red, green, blue. */
-  colour: (x, y) => {
-    const [a, b] = px([x, y]);
-    return [...ctx.getImageData(Math.round(a * view.ratio), Math.round(b * view.ratio), 1, 1).data].slice(0, 3);
-  },
 };
 })();
