@@ -3,7 +3,9 @@
 //! Responsible for: recording durations, keeping them in a file at exit, merging such files.
 //! Not responsible for: reading clocks while a machine steps (the roles do).
 //!
-//! Terms: a *name* says what was timed; see [`Timed`].
+//! Terms: a *name* says what was timed; see [`Timed`]. A thing is *due* at its intended time: in
+//! real time the deadlines of a grid, whether or not anybody came in time for them. What is timed
+//! from there counts every period that a stall has swallowed, each from its own deadline.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -21,8 +23,19 @@ const DIGITS: u8 = 2;
 /// What is timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Timed {
-    /// From the publication of a snapshot to its reader's first look.
+    /// From the publication of a snapshot to a robot's first look.
     SnapshotAge,
+    /// From the publication of a snapshot to the planner's first look.
+    PlannerSnapshotAge,
+    /// Real time: from when a robot was due to have the state of a period to when it had it, or
+    /// a newer one.
+    SnapshotLateness,
+    /// Checking a snapshot in place, by a robot.
+    SnapshotCheck,
+    /// Writing a snapshot in place.
+    SnapshotWrite,
+    /// Sending a written snapshot to all readers.
+    SnapshotSend,
     /// One step of the world.
     WorldStep,
     /// One step of the planner.
@@ -41,12 +54,19 @@ pub enum Timed {
     HardRoundTrip,
     /// From one tick of the world to the next.
     Tick,
+    /// Real time: from when a tick was due to its publication.
+    TickLateness,
 }
 
 impl Timed {
     /// All of them, in the order in which they are reported.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 16] = [
         Self::SnapshotAge,
+        Self::PlannerSnapshotAge,
+        Self::SnapshotLateness,
+        Self::SnapshotCheck,
+        Self::SnapshotWrite,
+        Self::SnapshotSend,
         Self::WorldStep,
         Self::PlannerStep,
         Self::RobotStep,
@@ -56,6 +76,7 @@ impl Timed {
         Self::PathSearch,
         Self::HardRoundTrip,
         Self::Tick,
+        Self::TickLateness,
     ];
 
     /// Its name in results.
@@ -63,6 +84,11 @@ impl Timed {
     pub const fn name(self) -> &'static str {
         match self {
             Self::SnapshotAge => "snapshot_age",
+            Self::PlannerSnapshotAge => "planner_snapshot_age",
+            Self::SnapshotLateness => "snapshot_lateness",
+            Self::SnapshotCheck => "snapshot_check",
+            Self::SnapshotWrite => "snapshot_write",
+            Self::SnapshotSend => "snapshot_send",
             Self::WorldStep => "world_step",
             Self::PlannerStep => "planner_step",
             Self::RobotStep => "robot_step",
@@ -72,6 +98,7 @@ impl Timed {
             Self::PathSearch => "path_search",
             Self::HardRoundTrip => "hard_round_trip",
             Self::Tick => "tick",
+            Self::TickLateness => "tick_lateness",
         }
     }
 }
@@ -126,6 +153,13 @@ impl Latencies {
     /// Records one duration. Makes no system call and allocates nothing.
     pub fn record(&mut self, timed: Timed, duration_ns: u64) {
         self.histograms[timed as usize].saturating_record(duration_ns);
+    }
+
+    /// Forgets all that was recorded: the warm-up is over.
+    pub fn reset(&mut self) {
+        for histogram in &mut self.histograms {
+            histogram.reset();
+        }
     }
 
     /// Adds all that another process recorded.
@@ -204,7 +238,9 @@ impl Latencies {
     }
 }
 
-fn empty() -> Histogram<u64> {
+/// A histogram with the bounds of them all.
+#[must_use]
+pub fn empty() -> Histogram<u64> {
     #[expect(
         clippy::expect_used,
         reason = "the bounds are constants, and a test makes one"
@@ -212,7 +248,9 @@ fn empty() -> Histogram<u64> {
     Histogram::new_with_bounds(1, HIGHEST_NS, DIGITS).expect("constant bounds are legal")
 }
 
-fn summary(histogram: &Histogram<u64>) -> LatencySummary {
+/// What a result says of `histogram`.
+#[must_use]
+pub fn summary(histogram: &Histogram<u64>) -> LatencySummary {
     LatencySummary {
         count: histogram.len(),
         p50_ns: histogram.value_at_quantile(0.5),

@@ -13,6 +13,7 @@ pub mod histograms;
 pub mod options;
 mod ports;
 mod realtime;
+pub mod reference;
 pub mod report;
 pub mod roles;
 pub mod shared_memory;
@@ -25,5 +26,6 @@ mod wire;
 
 pub use histograms::{Latencies, LatencySummary, Timed};
 pub use options::{Clock, Delay, Launcher, OptionError, Role, RunOptions, RunPlan, Wait};
+pub use realtime::pin_thread;
 pub use report::{RoleReport, RunReport, WorldReport};
-pub use supervisor::{Observer, RunError};
+pub use supervisor::{Observer, RunError, Signals};

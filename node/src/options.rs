@@ -87,6 +87,8 @@ pub struct RunOptions {
     pub monitors: u32,
     /// Whole states in the trace, per second of world time.
     pub state_rate_hz: f64,
+    /// Ticks from the first on whose latencies are not kept.
+    pub warm_up_ticks: u64,
     /// Participants made slow on purpose.
     pub delays: Vec<Delay>,
     /// Where the recorder writes; if none, in the run's directory, which goes with the report.
@@ -107,6 +109,7 @@ impl RunOptions {
             realtime_scheduling: false,
             monitors: DEFAULT_MONITORS,
             state_rate_hz: DEFAULT_STATE_RATE_HZ,
+            warm_up_ticks: 0,
             delays: Vec::new(),
             trace: None,
             hashes: None,

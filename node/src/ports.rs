@@ -104,10 +104,10 @@ pub(crate) struct Topic<T> {
 
 /// A topic that exists.
 pub(crate) struct Service<T: Message> {
-    topic: &'static str,
-    history: usize,
-    buffer: usize,
-    factory: PortFactory<ipc::Service, Wire<T>, ()>,
+    pub(crate) topic: &'static str,
+    pub(crate) history: usize,
+    pub(crate) buffer: usize,
+    pub(crate) factory: PortFactory<ipc::Service, Wire<T>, ()>,
 }
 
 /// Sends messages.

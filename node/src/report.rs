@@ -28,6 +28,8 @@ pub struct RoleReport {
     pub wall_s: f64,
     /// Real time: periods it was too late for, and skipped.
     pub deadline_misses: u64,
+    /// Snapshots that were gone before it looked, the warm-up not counted.
+    pub snapshots_skipped: u64,
     /// Messages it knows it lost: for the world commands that never arrived or were invalid, for
     /// the recorder batches, for robots constraint tables.
     pub lost: u64,
@@ -166,6 +168,8 @@ pub struct RunReport {
     pub latency: Latencies,
     /// Real time: periods missed by any process.
     pub deadline_misses: u64,
+    /// Snapshots that were gone before a robot or the planner looked, warm-up not counted.
+    pub snapshots_skipped: u64,
     /// Commands that never reached the world, or were invalid.
     pub lost_commands: u64,
     /// Processes started again during set-up.
@@ -192,6 +196,7 @@ impl RoleReport {
             cpu_s: 0.0,
             wall_s: 0.0,
             deadline_misses: 0,
+            snapshots_skipped: 0,
             lost: 0,
             counters: WorkReport {
                 polygon_tests: 0,

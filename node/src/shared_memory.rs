@@ -57,8 +57,9 @@ pub enum ResourceError {
     },
 }
 
-/// Compares what a run needs with what there is, and raises this process's soft limit on open
-/// files, which its children inherit, as far as needed.
+/// Compares what a run needs with what there is, and raises this process's limit on open files,
+/// which its children inherit, as far as needed and permitted: the soft one up to the hard one, and
+/// that with `CAP_SYS_RESOURCE`.
 ///
 /// # Errors
 /// There is too little; both numbers.
@@ -80,20 +81,14 @@ pub(crate) fn reserve(bytes: u64, participants: u64) -> Result<(), ResourceError
         limits.current.unwrap_or(u64::MAX),
         limits.maximum.unwrap_or(u64::MAX),
     );
-    if needed > hard {
-        return Err(ResourceError::Descriptors {
-            needed,
-            limit: hard,
-        });
-    }
     if needed > soft {
         let raised = Rlimit {
             current: Some(needed),
-            maximum: limits.maximum,
+            maximum: limits.maximum.map(|hard| hard.max(needed)),
         };
         setrlimit(Resource::Nofile, raised).map_err(|_| ResourceError::Descriptors {
             needed,
-            limit: soft,
+            limit: hard,
         })?;
     }
     Ok(())

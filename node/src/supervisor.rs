@@ -27,8 +27,10 @@ use crate::ports::{self, IpcNode, TopicError};
 use crate::report::RunReport;
 use crate::shared_memory::{self, ResourceError};
 use crate::topics::{HeldTopics, Topics};
-use signals::Signals;
 use watch::Watch;
+
+pub(crate) use set_up::make_private;
+pub use signals::Signals;
 
 /// Sleep between two looks at the processes.
 const PERIOD: Duration = Duration::from_millis(5);
@@ -183,7 +185,7 @@ impl<'p> Run<'p> {
             options: &options,
         })?;
         let node = ports::join(&file.root, &file.prefix, "supervisor")?;
-        set_up::make_private(&file)?;
+        make_private(&file)?;
         let topics = topics.create(&node)?;
         Ok(Self {
             plan,

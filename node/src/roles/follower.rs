@@ -1,20 +1,21 @@
 //! Following the world: getting the next snapshot, when it is time for it.
 //!
 //! Responsible for: in lockstep, waiting for each snapshot; in real time, own absolute deadlines
-//! at an own place in the world's period, and the newest snapshot there is at each.
+//! at an own place in the world's period, and the newest snapshot there is at each; how old it is
+//! then.
 //! Not responsible for: what is done with a snapshot.
 //!
 //! Terms: a *phase* is where in the world's period a participant's deadline lies, so that not all
 //! start at once.
 
-use shm_types::{Outcome, WorldSnapshot};
+use shm_types::{Outcome, SnapshotHeader, WorldSnapshot};
 
 use crate::clock;
 use crate::histograms::Timed;
-use crate::options::Clock;
+use crate::options::Role;
 use crate::ports::{Access, Sample, Subscriber};
 use crate::roles::{RoleError, Seat};
-use crate::ticker::Ticker;
+use crate::ticker::{Due, Ticker};
 use crate::wait::Waiter;
 
 /// A reader of snapshots.
@@ -23,8 +24,15 @@ pub(crate) struct Follower {
     waiter: Waiter,
     /// Deadline within the period, and the period, ns; `None` in lockstep.
     grid: Option<(u64, u64)>,
-    /// The own deadlines, once the world's are known.
+    /// The own deadlines, once time has started.
     ticker: Option<Ticker>,
+    /// When the state of each period is due, likewise.
+    due: Option<Due>,
+    /// What the age of a snapshot counts as.
+    age: Timed,
+    /// Tick of the newest snapshot.
+    tick: u64,
+    skipped: u64,
 }
 
 impl Follower {
@@ -38,24 +46,33 @@ impl Follower {
             let wakes = &seat.topics.wake_participants;
             wakes.service(&seat.node, Access::Open)?.sleeper()
         })?;
-        let grid = match seat.options().clock {
-            Clock::Lockstep => None,
-            Clock::Real { .. } => seat.options().clock.period_ns().map(|period_ns| {
-                let phase_ns = period_ns * u64::from(turn + 1) / u64::from(turns + 1);
-                (phase_ns, period_ns)
-            }),
-        };
+        let grid = seat.options().clock.period_ns().map(|period_ns| {
+            let phase_ns = period_ns * u64::from(turn + 1) / u64::from(turns + 1);
+            (phase_ns, period_ns)
+        });
         Ok(Self {
             inlet: service.subscriber()?,
             waiter,
             grid,
             ticker: None,
+            due: None,
+            age: match seat.role {
+                Role::Planner => Timed::PlannerSnapshotAge,
+                _ => Timed::SnapshotAge,
+            },
+            tick: 0,
+            skipped: 0,
         })
     }
 
     /// Deadlines that had passed before this participant came to wait for them.
     pub(crate) fn deadline_misses(&self) -> u64 {
         self.ticker.map_or(0, |ticker| ticker.misses())
+    }
+
+    /// Snapshots that were gone before this participant looked, the warm-up not counted.
+    pub(crate) const fn skipped(&self) -> u64 {
+        self.skipped
     }
 
     /// The next snapshot, once it is time for it; `None` once the run is over or this process is
@@ -68,6 +85,9 @@ impl Follower {
         seat: &mut Seat,
     ) -> Result<Option<Sample<WorldSnapshot>>, RoleError> {
         if let Some(ticker) = &mut self.ticker {
+            if !seat.is_warm() {
+                ticker.forget_misses();
+            }
             ticker.wait();
         }
         while !seat.is_stopped() {
@@ -80,26 +100,38 @@ impl Follower {
                 }
                 continue;
             };
+            let now_ns = clock::now_ns();
             self.waiter.arrived();
             let header = &sample.header;
             if header.outcome != Outcome::Running.code() {
                 return Ok(None);
             }
-            seat.record_since(Timed::SnapshotAge, header.publish_stamp_ns);
-            if header.tick > 0 && self.ticker.is_none() {
-                self.start_ticker(header.publish_stamp_ns);
-            }
+            self.note(seat, header, now_ns);
             return Ok(Some(sample));
         }
         Ok(None)
     }
 
-    /// The world keeps its deadlines from its first tick on: so do we, at our phase.
-    fn start_ticker(&mut self, world_ns: u64) {
-        if let Some((phase_ns, period_ns)) = self.grid {
-            let passed = clock::now_ns().saturating_sub(world_ns + phase_ns);
-            let start_ns = world_ns + phase_ns + passed.div_ceil(period_ns) * period_ns;
-            self.ticker = Some(Ticker::new(start_ns, period_ns));
+    /// Notes when the snapshot with this header was first looked at.
+    fn note(&mut self, seat: &mut Seat, header: &SnapshotHeader, now_ns: u64) {
+        let stamp_ns = header.publish_stamp_ns;
+        let age_ns = now_ns.saturating_sub(stamp_ns);
+        seat.latencies.record(self.age, age_ns);
+        if seat.is_warm() {
+            self.skipped += header.tick.saturating_sub(self.tick + 1);
+        }
+        self.tick = header.tick;
+        if let (Some(due), Timed::SnapshotAge) = (&mut self.due, self.age) {
+            for late_ns in due.came(stamp_ns, now_ns) {
+                seat.latencies.record(Timed::SnapshotLateness, late_ns);
+            }
+        }
+        if header.tick > 0
+            && self.ticker.is_none()
+            && let Some((phase_ns, period_ns)) = self.grid
+        {
+            self.ticker = Some(Ticker::aligned(now_ns, period_ns, phase_ns));
+            self.due = Some(Due::new(period_ns, phase_ns));
         }
     }
 }

@@ -133,10 +133,13 @@ impl Seat {
         })
     }
 
-    /// Takes its core, priority and memory, once all its ports exist. What is not permitted is
+    /// Takes its core, priority, timers and memory, once all its ports exist. What is not permitted is
     /// noted.
     pub(crate) fn settle(&mut self) {
         let mut asked = Vec::new();
+        if matches!(self.options().clock, Clock::Real { .. }) {
+            asked.push(realtime::sharpen_timers());
+        }
         if self.options().pin {
             asked.push(realtime::pin(self.role, self.run.robots));
         }
@@ -204,9 +207,17 @@ impl Seat {
             std::thread::sleep(delay);
         }
         self.answered += 1;
+        if self.answered == self.options().warm_up_ticks {
+            self.latencies.reset();
+        }
         let now_ns = clock::now_ns();
         let (first_ns, _) = self.active_ns.unwrap_or((now_ns, now_ns));
         self.active_ns = Some((first_ns, now_ns));
+    }
+
+    /// Whether what is counted from here on counts: the warm-up is over.
+    pub(crate) const fn is_warm(&self) -> bool {
+        self.answered >= self.options().warm_up_ticks
     }
 
     /// Leaves the run: keeps what there is to tell in its directory.
@@ -222,6 +233,7 @@ impl Seat {
             cpu_s: clock::cpu_s(),
             wall_s: (last_ns - first_ns) as f64 * 1e-9,
             deadline_misses: telling.deadline_misses,
+            snapshots_skipped: telling.snapshots_skipped,
             lost: telling.lost,
             counters: telling.counters,
             notes: self.notes,
@@ -248,6 +260,7 @@ impl Seat {
 #[derive(Default)]
 pub(crate) struct Telling {
     pub(crate) deadline_misses: u64,
+    pub(crate) snapshots_skipped: u64,
     pub(crate) lost: u64,
     pub(crate) counters: crate::report::WorkReport,
     pub(crate) world: Option<crate::report::WorldReport>,

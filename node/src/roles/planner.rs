@@ -39,6 +39,7 @@ pub fn main(run_dir: &Path) -> Result<(), RoleError> {
     }
     let telling = Telling {
         deadline_misses: follower.deadline_misses(),
+        snapshots_skipped: follower.skipped(),
         counters: shell.counters.into(),
         ..Telling::default()
     };

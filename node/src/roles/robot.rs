@@ -17,6 +17,7 @@ use shm_types::{Checked, Command, WorldSnapshot};
 use world::FIRST_INCARNATION;
 
 use crate::clock;
+use crate::histograms::Timed;
 use crate::options::Role;
 use crate::ports::{Access, Publisher};
 use crate::roles::follower::Follower;
@@ -40,11 +41,14 @@ pub fn main(run_dir: &Path, index: u32) -> Result<(), RoleError> {
     let mut follower = Follower::new(&seat, index, robots + 1)?;
     seat.settle();
     while let Some(snapshot) = follower.next(&mut seat)? {
+        let received_ns = clock::now_ns();
         let snapshot = Checked::new(&*snapshot, seat.counts()).map_err(refused("world"))?;
+        seat.record_since(Timed::SnapshotCheck, received_ns);
         shell.answer(&mut seat, snapshot)?;
     }
     let telling = Telling {
         deadline_misses: follower.deadline_misses(),
+        snapshots_skipped: follower.skipped(),
         counters: shell.command.counters.into(),
         ..Telling::default()
     };

@@ -24,7 +24,7 @@ use crate::options::Role;
 use crate::ports::{Access, Publisher};
 use crate::report::{ActivityReport, WorldReport};
 use crate::roles::{RoleError, Seat, Telling};
-use crate::ticker::Ticker;
+use crate::ticker::{Due, Ticker};
 use crate::wait::Waiter;
 use crate::wakes::Waker;
 use ears::Ears;
@@ -44,10 +44,9 @@ pub fn main(run_dir: &Path) -> Result<(), RoleError> {
     let mut seat = Seat::take(run_dir, Role::World)?;
     let mut shell = Shell::new(&seat)?;
     seat.settle();
-    shell.publish()?;
+    shell.publish(&mut seat)?;
     if shell.wait_for_all(&seat)? {
         shell.start_ticker(&seat);
-        shell.published_ns = clock::now_ns();
         shell.run(&mut seat)?;
     }
     shell.linger(&seat)?;
@@ -72,6 +71,8 @@ struct Shell {
     waker: Option<Waker>,
     /// The own deadlines, in real time.
     ticker: Option<Ticker>,
+    /// When each tick is due, in real time.
+    due: Option<Due>,
     hashes: Option<HashFile>,
     /// What the step of this tick is told.
     control: Vec<ControlRequest>,
@@ -97,6 +98,7 @@ impl Shell {
             waiter: seat.waiter(sleeper)?,
             waker: seat.waker(waker)?,
             ticker: None,
+            due: None,
             hashes: options
                 .hashes
                 .as_deref()
@@ -112,13 +114,15 @@ impl Shell {
         loop {
             self.step(seat)?;
             seat.answering();
-            self.publish()?;
-            seat.latencies.record(Timed::Tick, self.since_before());
+            self.publish(seat)?;
             if self.world.outcome() != Outcome::Running {
                 return Ok(());
             }
             let go_on = match &mut self.ticker {
                 Some(ticker) => {
+                    if !seat.is_warm() {
+                        ticker.forget_misses();
+                    }
                     ticker.wait();
                     self.ears.listen(&self.world)?;
                     !seat.is_stopped()
@@ -134,7 +138,10 @@ impl Shell {
     /// In real time, too, everybody must have answered the first snapshot; then time starts.
     fn start_ticker(&mut self, seat: &Seat) {
         if let Some(period_ns) = seat.options().clock.period_ns() {
-            self.ticker = Some(Ticker::new(clock::now_ns() + period_ns, period_ns));
+            let mut ticker = Ticker::aligned(clock::now_ns(), period_ns, 0);
+            ticker.wait();
+            self.ticker = Some(ticker);
+            self.due = Some(Due::new(period_ns, 0));
         }
     }
 
@@ -184,23 +191,33 @@ impl Shell {
         Ok(())
     }
 
-    fn publish(&mut self) -> Result<(), RoleError> {
+    fn publish(&mut self, seat: &mut Seat) -> Result<(), RoleError> {
         let (world, run_id) = (&self.world, self.run_id);
+        let started_ns = clock::now_ns();
+        let mut stamp_ns = started_ns;
         self.snapshots.send(|snapshot| {
             world.snapshot_into(snapshot);
             snapshot.header.run_id = run_id;
-            snapshot.header.publish_stamp_ns = clock::now_ns();
+            stamp_ns = clock::now_ns();
+            snapshot.header.publish_stamp_ns = stamp_ns;
         })?;
+        let sent_ns = clock::now_ns();
+        let before_ns = std::mem::replace(&mut self.published_ns, sent_ns);
+        if self.tick > 1 {
+            let latencies = &mut seat.latencies;
+            latencies.record(Timed::SnapshotWrite, stamp_ns - started_ns);
+            latencies.record(Timed::SnapshotSend, sent_ns - stamp_ns);
+            latencies.record(Timed::Tick, sent_ns - before_ns);
+        }
+        if let Some(due) = &mut self.due {
+            for late_ns in due.came(stamp_ns, stamp_ns) {
+                seat.latencies.record(Timed::TickLateness, late_ns);
+            }
+        }
         if let Some(waker) = &self.waker {
             waker.wake()?;
         }
         Ok(())
-    }
-
-    /// Time since this was last asked.
-    fn since_before(&mut self) -> u64 {
-        let now_ns = clock::now_ns();
-        now_ns - std::mem::replace(&mut self.published_ns, now_ns)
     }
 
     /// Stays, so that everybody can see the end, until the supervisor lets go.

@@ -57,6 +57,7 @@ impl Run<'_> {
             counters,
             latency,
             deadline_misses: roles.iter().map(|role| role.deadline_misses).sum(),
+            snapshots_skipped: roles.iter().map(|role| role.snapshots_skipped).sum(),
             lost_commands,
             restarts: self.restarts,
             wall_s,

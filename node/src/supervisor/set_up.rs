@@ -105,7 +105,7 @@ impl Run<'_> {
 }
 
 /// Takes the run's files in shared memory away from everybody else.
-pub(super) fn make_private(file: &RunFile) -> Result<(), RunError> {
+pub(crate) fn make_private(file: &RunFile) -> Result<(), RunError> {
     shared_memory::make_private(&file.prefix)
         .map_err(|source| DomainError::File {
             path: shared_memory::SHARED_MEMORY.into(),

@@ -18,8 +18,9 @@ static RUNS: Mutex<usize> = Mutex::new(0);
 /// Set while none is on.
 static IDLE: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// The signals of one run.
-pub(super) struct Signals {
+/// The signals of one run. A program that makes several runs holds one over all of them, so that
+/// a signal between two does not end it.
+pub struct Signals {
     noted: Arc<AtomicBool>,
     handlers: Vec<SigId>,
 }
@@ -29,7 +30,7 @@ impl Signals {
     ///
     /// # Errors
     /// The system refused.
-    pub(super) fn watch() -> io::Result<Self> {
+    pub fn watch() -> io::Result<Self> {
         let mut runs = RUNS.lock().unwrap_or_else(PoisonError::into_inner);
         if IDLE.get().is_none() {
             let idle = Arc::new(AtomicBool::new(false));
@@ -49,7 +50,7 @@ impl Signals {
     }
 
     /// Whether a signal has come since this was last asked.
-    pub(super) fn take(&self) -> bool {
+    pub fn take(&self) -> bool {
         self.noted.swap(false, Ordering::Relaxed)
     }
 }
