@@ -7,6 +7,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+use node::Wait;
 
 use crate::exit::STATUSES;
 use crate::run_options::RunArgs;
@@ -63,6 +64,29 @@ pub(crate) enum Command {
     Robot(RoleArgs),
     /// Role: the process that writes the trace
     #[command(hide = true)]
+    Recorder(RoleArgs),
+    /// Bare iceoryx2 in the place of a role, as what a run is measured against
+    #[command(hide = true)]
+    Reference(ReferenceArgs),
+}
+
+/// What a process of the reference is started with, by `bench latency`.
+#[derive(Debug, Args)]
+pub(crate) struct ReferenceArgs {
+    #[command(subcommand)]
+    pub(crate) role: ReferenceRole,
+}
+
+/// Whose place it takes.
+#[derive(Debug, Subcommand)]
+pub(crate) enum ReferenceRole {
+    /// The world's
+    World(RoleArgs),
+    /// The planner's
+    Planner(RoleArgs),
+    /// A robot's
+    Robot(RoleArgs),
+    /// The recorder's
     Recorder(RoleArgs),
 }
 
@@ -208,6 +232,9 @@ pub(crate) enum Workload {
     Paper(PaperArgs),
     /// Two results: ratios with intervals, and status 1 where something got worse
     Compare(CompareArgs),
+    /// What shared memory costs as robots are added: latencies of real processes, beside bare
+    /// iceoryx2, a cache line and Unix datagrams
+    Latency(LatencyArgs),
 }
 
 #[derive(Debug, Args)]
@@ -289,6 +316,36 @@ pub(crate) struct SpeedArgs {
     /// Print one JSON object
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  rearrange bench latency --robots 1,4 --quick\n\n\
+                  Everything is measured in turn, again and again. docs/benchmarks.md says what \
+                  each number means."
+)]
+pub(crate) struct LatencyArgs {
+    /// Numbers of robots, each a process [default: 1,2,4,8,16,32,64]
+    #[arg(long, value_name = "M,…", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=MAX_ROBOTS))]
+    pub(crate) robots: Vec<u32>,
+    /// Numbers of objects; with 100 the robots are varied, with the others nothing else
+    /// [default: 10,100,1000]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=MAX_OBJECTS))]
+    pub(crate) objects: Vec<u32>,
+    /// How processes wait for each other in lockstep [default: spin,hybrid,block]
+    #[arg(long, value_name = "WAIT,…", value_delimiter = ',', value_parser = crate::run_options::wait())]
+    pub(crate) wait: Vec<Wait>,
+    /// How often everything is measured [default: 5]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000))]
+    pub(crate) repeats: Option<u32>,
+    /// Measure each for a short time only, and without SCHED_FIFO
+    #[arg(long, conflicts_with = "full")]
+    pub(crate) quick: bool,
+    /// Pin and prioritise with every wait, not with one only
+    #[arg(long)]
+    pub(crate) full: bool,
+    #[command(flatten)]
+    pub(crate) output: OutputArgs,
 }
 
 /// Where a benchmark's results go.

@@ -110,7 +110,7 @@ pub(crate) struct ProcessArgs {
     #[arg(long, value_enum, default_value_t = Driver::Processes)]
     pub(crate) driver: Driver,
     /// How processes wait for each other in lockstep
-    #[arg(long, default_value = "hybrid", value_parser = named::<Wait>(&["spin", "hybrid", "block"]))]
+    #[arg(long, default_value = "hybrid", value_parser = wait())]
     pub(crate) wait: Wait,
     /// Bind each process to a core
     #[arg(long)]
@@ -243,6 +243,11 @@ impl RunArgs {
 /// Whole nanoseconds in `seconds`.
 fn ns(seconds: f64) -> u64 {
     (seconds * 1e9).round() as u64
+}
+
+/// A parser of the ways to wait.
+pub(crate) fn wait() -> impl TypedValueParser<Value = Wait> {
+    named(&["spin", "hybrid", "block"])
 }
 
 /// A parser of one of `names` into the value that serde knows by it.

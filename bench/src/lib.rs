@@ -5,8 +5,10 @@
 //! Not responsible for: command lines or printing (the binary), or what is correct (tests).
 
 pub mod compare;
+pub mod conditions;
 pub mod figure;
 pub mod files;
+pub mod latency;
 pub mod machine;
 pub mod paper;
 pub mod progress;

@@ -51,6 +51,7 @@ fn dispatch(command: Command) -> Outcome {
         Command::Planner(args) => roles::main(node::Role::Planner, &args),
         Command::Robot(args) => roles::main(node::Role::Robot(args.index), &args),
         Command::Recorder(args) => roles::main(node::Role::Recorder, &args),
+        Command::Reference(args) => roles::reference(&args.role),
     }
 }
 

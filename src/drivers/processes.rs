@@ -44,18 +44,22 @@ pub(crate) fn run(
 /// # Errors
 /// The program cannot find itself.
 pub(crate) fn plan(scene: &Scene, options: RunOptions) -> Result<RunPlan, Failure> {
+    let text = scene::to_canonical_toml(scene);
+    Ok(RunPlan::new(text, options, launcher()?))
+}
+
+/// How this very program is started as a role.
+///
+/// # Errors
+/// The program cannot find itself.
+pub(crate) fn launcher() -> Result<Launcher, Failure> {
     let program = env::current_exe()
         .map_err(|error| Failure::system(format!("this program cannot find itself: {error}")))?;
-    let launcher = Launcher {
+    Ok(Launcher {
         program,
         before: Vec::new(),
         inherit_stderr: env::var_os("RUST_LOG").is_some(),
-    };
-    Ok(RunPlan::new(
-        scene::to_canonical_toml(scene),
-        options,
-        launcher,
-    ))
+    })
 }
 
 /// The failure that a run which could not be started ends in.

@@ -5,6 +5,7 @@
 //! Not responsible for: the measurements (crate `bench`).
 
 mod compare;
+mod latency;
 mod paper;
 mod speed;
 
@@ -26,6 +27,7 @@ pub(crate) fn main(workload: &Workload) -> Outcome {
         Workload::Speed(args) => speed::main(args),
         Workload::Paper(args) => paper::main(args),
         Workload::Compare(args) => compare::main(args),
+        Workload::Latency(args) => latency::main(args),
     }
 }
 
