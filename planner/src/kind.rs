@@ -26,6 +26,18 @@ impl Kind {
     /// The hard constraints: one path plan each.
     pub const HARD: [Self; 2] = [Self::H1, Self::H2];
 
+    /// The easy constraint found where object 1 and the robot that grasps 2 stand at the initial
+    /// place or the goal of their tasks.
+    #[must_use]
+    pub(crate) const fn easy(first_at_goal: bool, second_at_goal: bool) -> Self {
+        match (first_at_goal, second_at_goal) {
+            (false, false) => Self::E1,
+            (true, false) => Self::E2,
+            (false, true) => Self::E3,
+            (true, true) => Self::E4,
+        }
+    }
+
     /// Whether object 1 stands at its goal in the test, not at its initial place.
     #[must_use]
     pub const fn first_at_goal(self) -> bool {

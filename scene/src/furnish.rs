@@ -23,22 +23,19 @@ const MOVE_MIN: i32 = 8;
 /// How far next to another object "crowded" reaches, units.
 const CROWD_REACH: i32 = 18;
 
+/// The paper's object around its centre, units.
+const OBJECT: Rect = [-4, -4, 4, 4];
+/// The same with the robot that grasps it.
+const COMPOUND: Rect = [-5, -14, 5, 4];
+
 /// Puts robots and objects on a floor plan and scrambles them, if the dice fall well.
 pub(crate) fn furnish(
     rng: &mut ChaCha8Rng,
     plan: &Plan,
     options: &GenerateOptions,
 ) -> Option<Scene> {
-    let name = format!("random-{}", options.seed);
-    let size = (metres(plan.size.0), metres(plan.size.1));
-    let mut draft = Draft::room(&name, [0.0, 0.0, size.0, size.1]);
-    draft.walls = plan
-        .walls
-        .iter()
-        .map(|wall| WallDraft::Box(wall.map(metres)))
-        .collect();
-    draft.homes = place_homes(rng, plan, options.robots)?;
-    let goals = place_goals(rng, plan, &draft, options)?;
+    let mut draft = room(rng, plan, options)?;
+    let goals = place_objects(rng, plan, &draft, options, OBJECT)?;
     draft.objects = goals
         .iter()
         .map(|goal| ObjectDraft::paper(*goal, Some(*goal)))
@@ -59,6 +56,33 @@ pub(crate) fn furnish(
     let scene = Scene::new(draft).ok()?;
     check_certificate(&scene, &scene.certificate).ok()?;
     Some(scene)
+}
+
+/// Puts robots, objects and goals on a floor plan, wherever they fit.
+pub(crate) fn strew(rng: &mut ChaCha8Rng, plan: &Plan, options: &GenerateOptions) -> Option<Draft> {
+    let mut draft = room(rng, plan, options)?;
+    let starts = place_objects(rng, plan, &draft, options, COMPOUND)?;
+    let goals = place_objects(rng, plan, &draft, options, COMPOUND)?;
+    draft.objects = starts
+        .into_iter()
+        .zip(goals)
+        .map(|(start, goal)| ObjectDraft::paper(start, Some(goal)))
+        .collect();
+    Some(draft)
+}
+
+/// A floor plan with robots at home.
+fn room(rng: &mut ChaCha8Rng, plan: &Plan, options: &GenerateOptions) -> Option<Draft> {
+    let name = format!("random-{}", options.seed);
+    let size = (metres(plan.size.0), metres(plan.size.1));
+    let mut draft = Draft::room(&name, [0.0, 0.0, size.0, size.1]);
+    draft.walls = plan
+        .walls
+        .iter()
+        .map(|wall| WallDraft::Box(wall.map(metres)))
+        .collect();
+    draft.homes = place_homes(rng, plan, options.robots)?;
+    Some(draft)
 }
 
 /// Units as metres, each the decimal nearest to it.
@@ -140,21 +164,26 @@ fn propose(rng: &mut ChaCha8Rng, plan: &Plan, others: &[[f64; 2]], crowding: f64
     )
 }
 
-/// Goals that overlap no wall, no home and no other goal.
-fn place_goals(
+/// Places of all objects that overlap one another and homes nowhere, and walls nowhere within
+/// `body`, units around the centre.
+fn place_objects(
     rng: &mut ChaCha8Rng,
     plan: &Plan,
     draft: &Draft,
     options: &GenerateOptions,
+    body: Rect,
 ) -> Option<Vec<[f64; 2]>> {
-    // Half an object, and half an object and half a robot.
-    const HALF: i32 = 4;
-    let inside = [HALF, HALF, plan.size.0 - HALF, plan.size.1 - HALF];
+    let inside = [
+        -body[0],
+        -body[1],
+        plan.size.0 - body[2],
+        plan.size.1 - body[3],
+    ];
     let mut goals: Vec<[f64; 2]> = Vec::new();
     for _ in 0..options.objects {
         let goal = (0..PLACES).find_map(|_| {
             let (x, y) = propose(rng, plan, &goals, options.crowding);
-            let body = [x - HALF, y - HALF, x + HALF, y + HALF];
+            let body = [x + body[0], y + body[1], x + body[2], y + body[3]];
             let at = place(x, y);
             let apart = |other: &[f64; 2], least: f64| {
                 (other[0] - at[0]).abs().max((other[1] - at[1]).abs()) > least - 1e-9

@@ -14,8 +14,8 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::canonical;
-use crate::draft::Move;
-use crate::furnish::furnish;
+use crate::draft::{Draft, Move};
+use crate::furnish::{furnish, strew};
 use crate::rooms::{Plan, UNITS_PER_M2};
 use crate::scene::Scene;
 
@@ -113,6 +113,26 @@ pub fn generate(options: &GenerateOptions) -> Result<Generated, GenerateError> {
                     scene,
                 });
             }
+        }
+    }
+    Err(GenerateError::GaveUp { attempts: PLANS })
+}
+
+/// A room like those of [`generate`] with the objects and their goals anywhere: fit for measuring
+/// how planning grows, but nobody knows whether it has a solution. Every object can be grasped and
+/// released where it stands, as far as the walls go. Same options, same room; `extra_moves` does
+/// not count.
+///
+/// # Errors
+/// Options out of range, or too tight to be met.
+pub fn scatter(options: &GenerateOptions) -> Result<Draft, GenerateError> {
+    let area = checked_area(options)?;
+    let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
+    for _ in 0..PLANS {
+        if let Some(plan) = Plan::random(&mut rng, area, options.walls)
+            && let Some(draft) = strew(&mut rng, &plan, options)
+        {
+            return Ok(draft);
         }
     }
     Err(GenerateError::GaveUp { attempts: PLANS })

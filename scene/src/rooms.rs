@@ -136,8 +136,15 @@ impl Plan {
 
     /// Free floor in square units, walls that overlap counted once.
     pub(crate) fn free_area(&self) -> i32 {
-        let columns = 0..self.size.0;
-        columns.map(|x| self.free_in_column(x, self.size.1)).sum()
+        let height = self.size.1 as usize;
+        let mut covered = vec![false; self.size.0 as usize * height];
+        for wall in &self.walls {
+            let [x0, y0, x1, y1] = wall.map(|unit| unit as usize);
+            for column in covered.chunks_exact_mut(height).take(x1).skip(x0) {
+                column[y0..y1.min(height)].fill(true);
+            }
+        }
+        covered.iter().filter(|covered| !**covered).count() as i32
     }
 
     /// Free squares of column `x` below `top`.

@@ -1,141 +1,26 @@
-//! Broad phase: uniform grids over the room, so that a test looks only at what is near.
+//! Broad phase: which grounded objects, which walls lie near a box. Never misses one, may name
+//! some that are not near.
 //!
-//! Responsible for: bounding boxes; which grounded objects, which walls lie near a box. Never
-//! misses one, may name some that are not near. Not responsible for: whether they overlap.
-//!
-//! Grounded objects lie in the cell of their centre, in lists threaded through one array, so
-//! grasping and releasing allocate nothing; walls never move and lie in every cell they touch.
+//! Responsible for: keeping them by place (`scene::near`): grounded objects in the cell of their
+//! centre, so that grasping and releasing allocate nothing; walls, which never move, in every cell
+//! they touch. Not responsible for: whether they overlap.
 
-use scene::{Scene, Shape, Vec2};
+use scene::near::{Cells, Near};
+use scene::{Scene, Vec2};
 
-/// Most cells along one axis; larger rooms get larger cells.
-const MAX_CELLS_PER_AXIS: usize = 256;
-const NIL: u32 = u32::MAX;
+pub(crate) use scene::near::Aabb;
 
-/// An axis-aligned box, closed, world frame or relative to a body's centre, m.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Aabb {
-    pub(crate) min: Vec2,
-    pub(crate) max: Vec2,
-}
-
-impl Aabb {
-    /// The box of `shape` around its own centre.
-    pub(crate) fn of(shape: &Shape) -> Self {
-        let (min, max) = shape.extent();
-        Self { min, max }
-    }
-
-    /// The box of two points.
-    pub(crate) fn around(a: Vec2, b: Vec2) -> Self {
-        Self {
-            min: a.inf(&b),
-            max: a.sup(&b),
-        }
-    }
-
-    pub(crate) fn joined(self, other: Self) -> Self {
-        Self {
-            min: self.min.inf(&other.min),
-            max: self.max.sup(&other.max),
-        }
-    }
-
-    /// This box, centred at `at`.
-    pub(crate) fn at(self, at: Vec2) -> Self {
-        Self {
-            min: self.min + at,
-            max: self.max + at,
-        }
-    }
-
-    /// What a body of box `body` covers while its centre is anywhere in this box.
-    pub(crate) fn swept_by(self, body: Self) -> Self {
-        Self {
-            min: self.min + body.min,
-            max: self.max + body.max,
-        }
-    }
-
-    pub(crate) fn meets(&self, other: &Self) -> bool {
-        self.min.x <= other.max.x
-            && other.min.x <= self.max.x
-            && self.min.y <= other.max.y
-            && other.min.y <= self.max.y
-    }
-}
-
-/// How the room is cut into cells.
-#[derive(Clone, Debug)]
-struct Cells {
-    origin: Vec2,
-    cell_m: f64,
-    columns: usize,
-    rows: usize,
-}
-
-impl Cells {
-    fn over(scene: &Scene, least_cell_m: f64) -> Self {
-        let (min, max) = scene.bounds;
-        let size = max - min;
-        #[expect(clippy::cast_precision_loss, reason = "a small constant")]
-        let cell_m = least_cell_m.max(size.max() / MAX_CELLS_PER_AXIS as f64);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "between 1 and the most cells per axis"
-        )]
-        let count = |length_m: f64| ((length_m / cell_m) as usize + 1).min(MAX_CELLS_PER_AXIS + 1);
-        Self {
-            origin: min,
-            cell_m,
-            columns: count(size.x),
-            rows: count(size.y),
-        }
-    }
-
-    const fn len(&self) -> usize {
-        self.columns * self.rows
-    }
-
-    fn column_row(&self, at: Vec2) -> (usize, usize) {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "float casts saturate; what lies outside belongs to the nearest cell"
-        )]
-        let index =
-            |offset_m: f64, count: usize| ((offset_m / self.cell_m) as usize).min(count - 1);
-        let offset = at - self.origin;
-        (index(offset.x, self.columns), index(offset.y, self.rows))
-    }
-
-    fn cell(&self, at: Vec2) -> usize {
-        let (column, row) = self.column_row(at);
-        row * self.columns + column
-    }
-
-    /// The cells that `region` touches.
-    fn touched(&self, region: Aabb) -> impl Iterator<Item = usize> + use<> {
-        let (left, bottom) = self.column_row(region.min);
-        let (right, top) = self.column_row(region.max);
-        let columns = self.columns;
-        (bottom..=top).flat_map(move |row| (left..=right).map(move |column| row * columns + column))
-    }
-}
+/// Least size of a cell of objects, m.
+const LEAST_OBJECT_CELL_M: f64 = 0.1;
 
 /// The grounded objects, by place.
 #[derive(Clone, Debug)]
 pub(crate) struct Ground {
-    cells: Cells,
+    near: Near,
     /// Boxes of the objects around their centres.
     boxes: Vec<Aabb>,
     /// How far any object reaches from its centre.
     reach: Aabb,
-    heads: Vec<u32>,
-    next: Vec<u32>,
-    /// Where each lies, if it does.
-    places: Vec<Option<Vec2>>,
 }
 
 impl Ground {
@@ -144,12 +29,9 @@ impl Ground {
         let boxes: Vec<Aabb> = scene.objects.iter().map(|o| Aabb::of(&o.shape)).collect();
         let nothing = Aabb::around(Vec2::zeros(), Vec2::zeros());
         let reach = boxes.iter().fold(nothing, |all, b| all.joined(*b));
-        let cells = Cells::over(scene, (reach.max - reach.min).max().max(0.1));
+        let cell_m = (reach.max - reach.min).max().max(LEAST_OBJECT_CELL_M);
         let mut ground = Self {
-            heads: vec![NIL; cells.len()],
-            next: vec![NIL; boxes.len()],
-            places: vec![None; boxes.len()],
-            cells,
+            near: Near::new(scene, boxes.len(), cell_m),
             boxes,
             reach,
         };
@@ -161,42 +43,17 @@ impl Ground {
 
     /// Puts `object`, which is not on the ground, down at `at`.
     pub(crate) fn put(&mut self, object: usize, at: Vec2) {
-        let cell = self.cells.cell(at);
-        self.next[object] = self.heads[cell];
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "ids fit the wire's 32 bits"
-        )]
-        {
-            self.heads[cell] = object as u32;
-        }
-        self.places[object] = Some(at);
+        self.near.put(object, at);
     }
 
     /// Takes `object` off the ground.
     pub(crate) fn take(&mut self, object: usize) {
-        let Some(at) = self.places[object].take() else {
-            return;
-        };
-        let cell = self.cells.cell(at);
-        let mut here = self.heads[cell];
-        if here as usize == object {
-            self.heads[cell] = self.next[object];
-            return;
-        }
-        while here != NIL {
-            let next = self.next[here as usize];
-            if next as usize == object {
-                self.next[here as usize] = self.next[object];
-                return;
-            }
-            here = next;
-        }
+        self.near.take(object);
     }
 
     /// Where `object` lies on the ground.
     pub(crate) fn place(&self, object: usize) -> Option<Vec2> {
-        self.places[object]
+        self.near.place(object)
     }
 
     /// An object whose box meets `region` and for which `hit(object, place)` holds.
@@ -209,20 +66,9 @@ impl Ground {
             min: region.min - self.reach.max,
             max: region.max - self.reach.min,
         };
-        for cell in self.cells.touched(wide) {
-            let mut here = self.heads[cell];
-            while here != NIL {
-                let object = here as usize;
-                if let Some(at) = self.places[object]
-                    && self.boxes[object].at(at).meets(&region)
-                    && hit(object, at)
-                {
-                    return Some(object);
-                }
-                here = self.next[object];
-            }
-        }
-        None
+        self.near.find(wide, |object, at| {
+            self.boxes[object].at(at).meets(&region) && hit(object, at)
+        })
     }
 }
 
@@ -247,7 +93,7 @@ impl Walls {
             .iter()
             .map(|(shape, at)| Aabb::of(shape).at(*at))
             .collect();
-        let mut lists = vec![Vec::new(); cells.len()];
+        let mut lists = vec![Vec::new(); cells.count()];
         for (wall, region) in boxes.iter().enumerate() {
             for cell in cells.touched(*region) {
                 lists[cell].push(wall);

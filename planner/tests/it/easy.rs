@@ -1,9 +1,11 @@
 //! Easy constraints on rooms that isolate each of them.
 
-use planner::{EasyConstraints, Kind, Places};
+use planner::{EasyConstraints, Kind, Places, easy};
+use proptest::prelude::*;
 use scene::{Budget, Scene};
 use shm_types::{Counters, WorldSnapshot};
 
+use crate::random::rooms;
 use crate::room::{room, shipped, start};
 
 /// All easy constraints of a world, with their edges.
@@ -115,4 +117,60 @@ fn clearance_counts() {
     draft.robot.clearance_m = 0.06;
     let close = crate::room::scene_of(draft);
     assert_eq!(easy_of(&close, &start(&close)), [(Kind::E1, 0, 1)]);
+}
+
+/// The paper's way: a test of each kind for every ordered pair.
+fn plain(scene: &Scene, places: &[Option<Places>]) -> Vec<(Kind, usize, usize)> {
+    let mut found = Vec::new();
+    for (one, first) in places.iter().enumerate() {
+        for (two, second) in places.iter().enumerate().filter(|(two, _)| *two != one) {
+            let (Some(first), Some(second)) = (*first, *second) else {
+                continue;
+            };
+            for kind in Kind::EASY {
+                if easy::holds(scene, kind, (one, first), (two, second)) {
+                    let (before, after) = kind.edge(one, two);
+                    found.push((kind, before, after));
+                }
+            }
+        }
+    }
+    found
+}
+
+proptest! {
+    /// Whatever moved, was finished or taken up again since the last time.
+    #[test]
+    fn looking_only_at_what_is_near_misses_nothing(
+        scene in rooms(6),
+        changes in proptest::collection::vec(
+            proptest::collection::vec((0_usize..6, 0_usize..3, 0.0..3.6, 0.0..2.8), 0..4),
+            1..6,
+        ),
+    ) {
+        let mut places: Vec<_> = (scene.objects.iter())
+            .map(|object| Some(Places { initial: object.start, goal: object.goal? }))
+            .collect();
+        let mut easy = EasyConstraints::new(&scene);
+        for change in changes {
+            easy.begin(places.iter().copied());
+            let mut counters = Counters::default();
+            while easy.advance(&scene, &mut Budget::new(9), &mut counters).is_pending() {}
+            let mut found = Vec::new();
+            easy.for_each(|kind, before, after| found.push((kind, before, after)));
+            prop_assert_eq!(found, plain(&scene, &places));
+            let open = places.iter().flatten().count() as u64;
+            prop_assert_eq!(counters.polygon_tests, 4 * open * open.saturating_sub(1));
+            for (task, what, x, y) in change {
+                let task = task % places.len();
+                let at = scene::Vec2::new(x, y);
+                let old = places[task].unwrap_or(Places { initial: at, goal: at });
+                places[task] = match what {
+                    0 => None,
+                    1 => Some(Places { initial: at, ..old }),
+                    _ => Some(Places { goal: at, ..old }),
+                };
+            }
+        }
+    }
 }

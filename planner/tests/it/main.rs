@@ -7,11 +7,15 @@ mod easy;
 #[cfg(test)]
 mod field;
 #[cfg(test)]
+mod floods;
+#[cfg(test)]
 mod hard;
 #[cfg(test)]
 mod obstacles;
 #[cfg(test)]
 mod priority;
+#[cfg(test)]
+mod random;
 #[cfg(test)]
 mod room;
 #[cfg(test)]
