@@ -14,7 +14,7 @@ use shm_types::Counters;
 
 use crate::frontier::{Frontier, NOWHERE, STRAIGHT};
 use crate::joints::{Joints, are_close};
-use crate::search::STEP_COSTS;
+use crate::search::{STEP_COSTS, fresh_after};
 
 /// A resumable flood with its buffers. Block what stands in the way with
 /// [`DistanceField::occupancy`], then [`DistanceField::begin`], then [`DistanceField::advance`]
@@ -53,7 +53,8 @@ impl DistanceField {
         self.frontier.begin();
         self.joints.find(scene, &self.occupancy, from);
         for joint in self.joints.list() {
-            self.frontier.offer(joint.cell, NOWHERE, joint.cost, 0);
+            self.frontier
+                .offer(joint.cell, NOWHERE, joint.cost, u8::MAX, || 0);
         }
     }
 
@@ -64,19 +65,21 @@ impl DistanceField {
             counters.path_plans += 1;
         }
         while !budget.is_spent() {
-            let Some((cell, cost)) = self.frontier.take() else {
+            let Some((cell, cost, fresh)) = self.frontier.take() else {
                 return Poll::Ready(());
             };
             budget.spend(1);
             counters.cells_expanded += 1;
             let offsets = self.occupancy.offsets();
-            let mut steps = self.occupancy.steps(cell);
+            let free = self.occupancy.steps(cell);
+            let mut steps = free & fresh;
             while steps != 0 {
                 let direction = steps.trailing_zeros() as usize;
                 steps &= steps - 1;
                 let next = cell.wrapping_add_signed(offsets[direction]);
+                let fresh = fresh_after(direction, free);
                 self.frontier
-                    .offer(next, cell, cost + STEP_COSTS[direction], 0);
+                    .offer(next, cell, cost + STEP_COSTS[direction], fresh, || 0);
             }
         }
         if self.frontier.is_empty() {

@@ -27,22 +27,32 @@ const WORDS: usize = SPAN as usize / 64;
 /// No point: the end of a list, or "reached from the start".
 pub(crate) const NOWHERE: u32 = u32::MAX;
 
-/// Neighbours in a bucket's list.
+/// What is known of a lattice point: all in one place, since a search jumps about.
 #[derive(Clone, Copy, Debug)]
-struct Link {
+struct Node {
+    /// The round it was last reached in, and below that its cost then. Rounds count down, so one
+    /// comparison tells whether a point is untouched or reached at a higher cost.
+    seen: u64,
+    from: u32,
+    /// Neighbours in the list of its bucket.
     next: u32,
     previous: u32,
+    /// Directions that may lead to something better, as the one who offered it said.
+    fresh: u8,
 }
+
+const UNTOUCHED: Node = Node {
+    seen: u64::MAX,
+    from: NOWHERE,
+    next: NOWHERE,
+    previous: NOWHERE,
+    fresh: u8::MAX,
+};
 
 /// Open list and costs of one search at a time.
 #[derive(Clone, Debug)]
 pub(crate) struct Frontier {
-    /// Of each point: the round it was last reached in, and below that its cost then. Rounds
-    /// count down, so one comparison tells whether a point is untouched or reached at a
-    /// higher cost.
-    seen: Vec<u64>,
-    from: Vec<u32>,
-    links: Vec<Link>,
+    nodes: Vec<Node>,
     round: u32,
     heads: Vec<u32>,
     occupied: [u64; WORDS],
@@ -55,14 +65,8 @@ pub(crate) struct Frontier {
 impl Frontier {
     /// Room for `points` lattice points.
     pub(crate) fn new(points: usize) -> Self {
-        let unlinked = Link {
-            next: NOWHERE,
-            previous: NOWHERE,
-        };
         Self {
-            seen: vec![u64::MAX; points],
-            from: vec![NOWHERE; points],
-            links: vec![unlinked; points],
+            nodes: vec![UNTOUCHED; points],
             round: u32::MAX,
             heads: vec![NOWHERE; SPAN as usize],
             occupied: [0; WORDS],
@@ -75,7 +79,7 @@ impl Frontier {
     /// Forgets everything.
     pub(crate) fn begin(&mut self) {
         if self.round == 0 {
-            self.seen.fill(u64::MAX);
+            self.nodes.fill(UNTOUCHED);
             self.round = u32::MAX;
         }
         self.round -= 1;
@@ -85,31 +89,37 @@ impl Frontier {
         self.started = false;
     }
 
-    /// Whether a way to `cell` that costs `cost` is better than what is known: only then is it
-    /// worth offering. Never for a point that was served: no later way to it is better.
-    #[inline]
-    pub(crate) fn improves(&self, cell: u32, cost: u32) -> bool {
-        self.stamp(cost) < self.seen[cell as usize]
-    }
-
     /// Offers a way to `cell` that costs `cost`, reached from `from`; `bound` is a lower bound
     /// of what remains from there, always the same for one point of one search. Kept only if
-    /// it is better than what is known.
+    /// it is better than what is known; the bound is worked out only then. `fresh` comes back
+    /// when the point is served.
     #[inline]
-    pub(crate) fn offer(&mut self, cell: u32, from: u32, cost: u32, bound: u32) {
-        if !self.improves(cell, cost) {
+    pub(crate) fn offer(
+        &mut self,
+        cell: u32,
+        from: u32,
+        cost: u32,
+        fresh: u8,
+        bound: impl FnOnce() -> u32,
+    ) {
+        let stamp = self.stamp(cost);
+        let node = &mut self.nodes[cell as usize];
+        if stamp >= node.seen {
             return;
         }
-        if let Some(old) = self.cost(cell) {
-            self.unlink(cell, old + bound);
+        let bound = bound();
+        let old = *node;
+        node.seen = stamp;
+        node.from = from;
+        node.fresh = fresh;
+        if (old.seen >> 32) as u32 == self.round {
+            self.unlink(old, old.seen as u32 + bound);
         }
         let key = cost + bound;
         debug_assert!(key >= self.current || !self.started);
         if !self.started {
             self.current = self.current.min(key);
         }
-        self.seen[cell as usize] = self.stamp(cost);
-        self.from[cell as usize] = from;
         self.link(cell, key);
     }
 
@@ -132,13 +142,15 @@ impl Frontier {
         Some(self.current)
     }
 
-    /// Serves the point with the least key: the point and the cost of the best way to it.
+    /// Serves the point with the least key: the point, the cost of the best way to it, and what
+    /// was said to be fresh.
     #[inline]
-    pub(crate) fn take(&mut self) -> Option<(u32, u32)> {
+    pub(crate) fn take(&mut self) -> Option<(u32, u32, u8)> {
         let key = self.least_key()?;
         let cell = self.heads[(key % SPAN) as usize];
-        self.unlink(cell, key);
-        Some((cell, self.seen[cell as usize] as u32))
+        let node = self.nodes[cell as usize];
+        self.unlink(node, key);
+        Some((cell, node.seen as u32, node.fresh))
     }
 
     /// Whether nothing waits.
@@ -149,13 +161,13 @@ impl Frontier {
     /// Cost of the best way to `cell` known, if any is.
     #[inline]
     pub(crate) fn cost(&self, cell: u32) -> Option<u32> {
-        let seen = self.seen[cell as usize];
+        let seen = self.nodes[cell as usize].seen;
         ((seen >> 32) as u32 == self.round).then_some(seen as u32)
     }
 
     /// The point before `cell` on the best way to it, or [`NOWHERE`].
     pub(crate) fn from(&self, cell: u32) -> u32 {
-        self.from[cell as usize]
+        self.nodes[cell as usize].from
     }
 
     #[inline]
@@ -172,23 +184,23 @@ impl Frontier {
         } else {
             self.heads[bucket]
         };
-        self.links[cell as usize] = Link {
-            next,
-            previous: NOWHERE,
-        };
+        let node = &mut self.nodes[cell as usize];
+        node.next = next;
+        node.previous = NOWHERE;
         if next != NOWHERE {
-            self.links[next as usize].previous = cell;
+            self.nodes[next as usize].previous = cell;
         }
         self.heads[bucket] = cell;
         self.occupied[word] |= bit;
         self.waiting += 1;
     }
 
+    /// Takes a point that waits under `key` out of its bucket's list.
     #[inline]
-    fn unlink(&mut self, cell: u32, key: u32) {
-        let Link { next, previous } = self.links[cell as usize];
+    fn unlink(&mut self, node: Node, key: u32) {
+        let Node { next, previous, .. } = node;
         if next != NOWHERE {
-            self.links[next as usize].previous = previous;
+            self.nodes[next as usize].previous = previous;
         }
         if previous == NOWHERE {
             let bucket = (key % SPAN) as usize;
@@ -197,7 +209,7 @@ impl Frontier {
                 self.occupied[bucket / 64] &= !(1 << (bucket % 64));
             }
         } else {
-            self.links[previous as usize].next = next;
+            self.nodes[previous as usize].next = next;
         }
         self.waiting -= 1;
     }
@@ -212,13 +224,13 @@ mod tests {
     fn the_better_of_two_offers_counts() {
         let mut frontier = Frontier::new(3);
         frontier.begin();
-        frontier.offer(0, NOWHERE, 500, 100);
-        frontier.offer(1, NOWHERE, 300, 0);
-        frontier.offer(0, 1, 150, 100);
-        frontier.offer(0, 2, 400, 100);
-        assert_eq!(frontier.take(), Some((0, 150)));
+        frontier.offer(0, NOWHERE, 500, u8::MAX, || 100);
+        frontier.offer(1, NOWHERE, 300, u8::MAX, || 0);
+        frontier.offer(0, 1, 150, u8::MAX, || 100);
+        frontier.offer(0, 2, 400, u8::MAX, || 100);
+        assert_eq!(frontier.take(), Some((0, 150, u8::MAX)));
         assert_eq!(frontier.from(0), 1);
-        assert_eq!(frontier.take(), Some((1, 300)));
+        assert_eq!(frontier.take(), Some((1, 300, u8::MAX)));
         assert_eq!(frontier.take(), None);
         assert_eq!(frontier.cost(2), None);
     }
@@ -227,7 +239,7 @@ mod tests {
     fn a_round_forgets_the_one_before() {
         let mut frontier = Frontier::new(2);
         frontier.begin();
-        frontier.offer(0, NOWHERE, 7, 0);
+        frontier.offer(0, NOWHERE, 7, u8::MAX, || 0);
         frontier.begin();
         assert_eq!(frontier.take(), None);
         assert_eq!(frontier.cost(0), None);
@@ -245,17 +257,17 @@ mod tests {
             let mut waiting = std::collections::BTreeMap::new();
             let mut served = std::collections::BTreeSet::new();
             for &(cell, cost) in &seeds {
-                frontier.offer(cell, NOWHERE, cost, 0);
+                frontier.offer(cell, NOWHERE, cost, u8::MAX, || 0);
                 let best = waiting.entry(cell).or_insert(cost);
                 *best = (*best).min(cost);
             }
             let mut steps = steps.into_iter();
-            while let Some((cell, cost)) = frontier.take() {
+            while let Some((cell, cost, _)) = frontier.take() {
                 prop_assert_eq!(waiting.remove(&cell), Some(cost));
                 prop_assert!(waiting.values().all(|&other| other >= cost));
                 prop_assert!(served.insert(cell));
                 for (next, step) in steps.by_ref().take(4) {
-                    frontier.offer(next, cell, cost + step, 0);
+                    frontier.offer(next, cell, cost + step, u8::MAX, || 0);
                     if !served.contains(&next) {
                         let best = waiting.entry(next).or_insert(cost + step);
                         *best = (*best).min(cost + step);

@@ -39,6 +39,39 @@ pub(crate) const STEP_COSTS: [u32; 8] = [
     STRAIGHT, STRAIGHT, STRAIGHT, STRAIGHT, DIAGONAL, DIAGONAL, DIAGONAL, DIAGONAL,
 ];
 
+/// For a step in each direction from a point with these free steps: the directions from its end
+/// that lead to none of the points which the first one offered itself. Those are no further from
+/// it directly than by way of the end, so offering them again would be in vain.
+static FRESH: [[u8; 256]; 8] = fresh();
+
+/// The directions worth trying after a step in `direction` from a point with `free` steps.
+#[inline]
+pub(crate) fn fresh_after(direction: usize, free: u8) -> u8 {
+    FRESH[direction][free as usize]
+}
+
+const fn fresh() -> [[u8; 256]; 8] {
+    let mut table = [[0; 256]; 8];
+    let mut index = 0;
+    while index < 8 * 256 * 8 {
+        let (step, free, next) = (index / (256 * 8), index / 8 % 256, index % 8);
+        let x = DIRECTIONS[step].0 + DIRECTIONS[next].0;
+        let y = DIRECTIONS[step].1 + DIRECTIONS[next].1;
+        let mut offered = x == 0 && y == 0;
+        let mut direction = 0;
+        while direction < 8 {
+            let is_there = DIRECTIONS[direction].0 == x && DIRECTIONS[direction].1 == y;
+            offered |= is_there && free >> direction & 1 == 1;
+            direction += 1;
+        }
+        if !offered {
+            table[step][free] |= 1 << next;
+        }
+        index += 1;
+    }
+    table
+}
+
 /// How a search stands.
 #[derive(Clone, Copy, Debug)]
 enum State {
@@ -129,7 +162,8 @@ impl PathSearch {
         for joint in self.starts.list() {
             let place = split(joint.cell, scene.lattice.width);
             let bound = self.target.bound(place, scene.lattice.connectivity);
-            self.frontier.offer(joint.cell, NOWHERE, joint.cost, bound);
+            self.frontier
+                .offer(joint.cell, NOWHERE, joint.cost, u8::MAX, || bound);
         }
     }
 
@@ -159,7 +193,7 @@ impl PathSearch {
                 self.state = State::Open(best);
                 return Poll::Pending;
             }
-            let Some((cell, cost)) = self.frontier.take() else {
+            let Some((cell, cost, fresh)) = self.frontier.take() else {
                 break;
             };
             if let Some(joint) = self.ends.at(cell) {
@@ -173,7 +207,7 @@ impl PathSearch {
             }
             budget.spend(1);
             counters.cells_expanded += 1;
-            self.open(scene, cell, cost);
+            self.open(scene, cell, cost, fresh);
         }
         let length = best.map(|(_, cell)| self.trace(scene, cell));
         self.state = State::Done(length);
@@ -196,7 +230,7 @@ impl PathSearch {
 
     /// Offers all free steps from a point.
     #[inline]
-    fn open(&mut self, scene: &Scene, cell: u32, cost: u32) {
+    fn open(&mut self, scene: &Scene, cell: u32, cost: u32, fresh: u8) {
         let Lattice {
             width,
             connectivity,
@@ -204,18 +238,19 @@ impl PathSearch {
         } = scene.lattice;
         let (x, y) = split(cell, width);
         let offsets = self.occupancy.offsets();
-        let mut steps = self.occupancy.steps(cell);
+        let free = self.occupancy.steps(cell);
+        let mut steps = free & fresh;
         while steps != 0 {
             let direction = steps.trailing_zeros() as usize;
             steps &= steps - 1;
             let next = cell.wrapping_add_signed(offsets[direction]);
             let cost = cost + STEP_COSTS[direction];
-            if self.frontier.improves(next, cost) {
+            let fresh = fresh_after(direction, free);
+            self.frontier.offer(next, cell, cost, fresh, || {
                 let (right, up) = DIRECTIONS[direction];
                 let place = (x.wrapping_add_signed(right), y.wrapping_add_signed(up));
-                let bound = self.target.bound(place, connectivity);
-                self.frontier.offer(next, cell, cost, bound);
-            }
+                self.target.bound(place, connectivity)
+            });
         }
     }
 

@@ -154,6 +154,9 @@ impl Occupancy {
         let bits = &self.raster.bits;
         let width = self.width as usize;
         let here = cell as usize;
+        if self.connectivity == Connectivity::Eight && is_open(bits, width, here) {
+            return u8::MAX;
+        }
         let own = bits[here];
         if own & POINT != 0 {
             return 0;
@@ -234,4 +237,18 @@ impl Occupancy {
     pub fn at_is_free(&self, scene: &Scene, at: Vec2) -> bool {
         self.straight_is_free(scene, at, at)
     }
+}
+
+/// Whether nothing at all is blocked at a cell and the eight around it: then all of these are on
+/// the lattice, since steps that leave it are blocked. Most cells are like that.
+#[inline]
+fn is_open(bits: &[u8], width: usize, here: usize) -> bool {
+    if here <= width || here + width + 3 > bits.len() {
+        return false;
+    }
+    let around = |middle: usize| {
+        let word: [u8; 4] = [bits[middle - 1], bits[middle], bits[middle + 1], 0];
+        u32::from_le_bytes(word)
+    };
+    around(here - width) | around(here) | around(here + width) == 0
 }
