@@ -235,6 +235,8 @@ pub(crate) enum Workload {
     /// What shared memory costs as robots are added: latencies of real processes, beside bare
     /// iceoryx2, a cache line and Unix datagrams
     Latency(LatencyArgs),
+    /// Each step of planning against the number of objects and of lattice points
+    Planning(PlanningArgs),
 }
 
 #[derive(Debug, Args)]
@@ -346,6 +348,34 @@ pub(crate) struct LatencyArgs {
     pub(crate) full: bool,
     #[command(flatten)]
     pub(crate) output: OutputArgs,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  rearrange bench planning --quick\n\n\
+                        Every step is timed in several rooms of each size, at a fixed \
+                        density, and its work is counted; growth exponents follow. The complete \
+                        measurement takes about half an hour.")]
+pub(crate) struct PlanningArgs {
+    /// Numbers of objects, separated by commas
+    #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = objects)]
+    pub(crate) objects: Vec<usize>,
+    /// Less of everything, within a minute
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Seed of the rooms
+    #[arg(long, value_name = "SEED", default_value_t = 0)]
+    pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) output: OutputArgs,
+}
+
+/// Parses a number of objects, for clap.
+fn objects(text: &str) -> Result<usize, String> {
+    use shm_types::capacity::MAX_OBJECTS;
+    match text.parse() {
+        Ok(count) if (1..=MAX_OBJECTS).contains(&count) => Ok(count),
+        _ => Err(format!("must be a whole number from 1 to {MAX_OBJECTS}")),
+    }
 }
 
 /// Where a benchmark's results go.

@@ -11,6 +11,7 @@ pub mod files;
 pub mod latency;
 pub mod machine;
 pub mod paper;
+pub mod planning;
 pub mod progress;
 pub mod report;
 pub mod results;

@@ -7,6 +7,7 @@
 mod compare;
 mod latency;
 mod paper;
+mod planning;
 mod speed;
 
 use std::path::{Path, PathBuf};
@@ -28,6 +29,7 @@ pub(crate) fn main(workload: &Workload) -> Outcome {
         Workload::Paper(args) => paper::main(args),
         Workload::Compare(args) => compare::main(args),
         Workload::Latency(args) => latency::main(args),
+        Workload::Planning(args) => planning::main(args),
     }
 }
 
