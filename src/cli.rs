@@ -237,6 +237,8 @@ pub(crate) enum Workload {
     Latency(LatencyArgs),
     /// Each step of planning against the number of objects and of lattice points
     Planning(PlanningArgs),
+    /// Many robots and objects in one thread: world time per wall time, and who is engaged
+    Scale(ScaleArgs),
 }
 
 #[derive(Debug, Args)]
@@ -364,6 +366,29 @@ pub(crate) struct PlanningArgs {
     pub(crate) quick: bool,
     /// Seed of the rooms
     #[arg(long, value_name = "SEED", default_value_t = 0)]
+    pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) output: OutputArgs,
+}
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  rearrange bench scale --quick\n  rearrange bench scale --objects 500 \
+                  --robots 64\n\nHalls in which the objects stand in rows; the largest, 1,000 objects \
+                  and 100 robots, takes about two minutes."
+)]
+pub(crate) struct ScaleArgs {
+    /// Small halls only: seconds
+    #[arg(long, conflicts_with = "objects")]
+    pub(crate) quick: bool,
+    /// Objects of the one hall to run [default: halls up to 1,000]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MAX_OBJECTS))]
+    pub(crate) objects: Option<u32>,
+    /// Robots in that hall
+    #[arg(long, value_name = "M", default_value_t = 10, requires = "objects", value_parser = clap::value_parser!(u32).range(1..=MAX_ROBOTS))]
+    pub(crate) robots: u32,
+    /// Seed of the goals
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
     pub(crate) seed: u64,
     #[command(flatten)]
     pub(crate) output: OutputArgs,

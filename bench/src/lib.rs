@@ -15,5 +15,6 @@ pub mod planning;
 pub mod progress;
 pub mod report;
 pub mod results;
+pub mod scale;
 pub mod speed;
 pub mod stats;

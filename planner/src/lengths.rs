@@ -6,8 +6,9 @@
 //! Not responsible for: comparing them (`selection`).
 //!
 //! Transit lengths come from one distance field per object. Where so many fields would take too
-//! much memory ([`MAX_KEPT_POINTS`]), they come from one field per free robot instead: the same
-//! lengths, computed at each selection.
+//! much memory ([`MAX_KEPT_POINTS`]), lengths are those of straight lines instead: which robot
+//! takes which task is then decided as if there were no walls, and a task that no path leads to is
+//! found out when it is tried.
 
 use std::task::Poll;
 
@@ -25,20 +26,22 @@ const MAX_KEPT_POINTS: usize = 1 << 24;
 /// Pairs of a robot and a task whose transit length is looked up for one unit.
 const LOOKUPS_PER_UNIT: u64 = 4;
 
-/// Which floods give the transit lengths.
+/// Where lengths come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Floods {
-    /// None: transit does not count.
-    None,
-    /// One per object, kept.
-    PerObject,
-    /// One per free robot, at each selection.
-    PerRobot,
+enum Source {
+    /// Transfers from paths; transit does not count.
+    TransferAlone,
+    /// Transfers from paths, transits from one flood per object, kept.
+    Floods,
+    /// Straight lines.
+    Lines,
 }
 
 /// A step of the computation, in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
+    /// Straight lines come next.
+    Lines,
     /// The transfer of this task, or of a later one, comes next.
     Transfer(usize),
     /// The transfer of this task is being searched.
@@ -56,7 +59,9 @@ enum Stage {
 pub(crate) struct Lengths {
     robots: usize,
     points: usize,
-    floods: Floods,
+    source: Source,
+    /// Whether performance is about transit too.
+    transit_counts: bool,
     search: PathSearch,
     field: DistanceField,
     /// Transfer of each task for the places it was computed for, m; infinite if there is none.
@@ -83,12 +88,12 @@ impl Lengths {
     pub(crate) fn new(scene: &Scene, settings: &Settings) -> Self {
         let (tasks, robots) = (scene.objects.len(), scene.homes.len());
         let points = scene.lattice.len();
-        let floods = match settings.performance {
-            Performance::Transfer => Floods::None,
-            _ if tasks.saturating_mul(points) <= MAX_KEPT_POINTS => Floods::PerObject,
-            _ => Floods::PerRobot,
+        let source = match settings.performance {
+            _ if tasks.saturating_mul(points) > MAX_KEPT_POINTS => Source::Lines,
+            Performance::Transfer => Source::TransferAlone,
+            Performance::TransitAndTransfer => Source::Floods,
         };
-        let kept = if floods == Floods::PerObject {
+        let kept = if source == Source::Floods {
             tasks * points
         } else {
             0
@@ -96,7 +101,8 @@ impl Lengths {
         Self {
             robots,
             points,
-            floods,
+            source,
+            transit_counts: settings.performance != Performance::Transfer,
             search: PathSearch::new(scene),
             field: DistanceField::new(scene),
             transfers: vec![None; tasks],
@@ -110,7 +116,10 @@ impl Lengths {
 
     /// Begins with the same questions that every [`Lengths::advance`] has to be given.
     pub(crate) fn begin(&mut self) {
-        self.stage = Stage::Transfer(0);
+        self.stage = match self.source {
+            Source::Lines => Stage::Lines,
+            _ => Stage::Transfer(0),
+        };
         self.meter.reset();
     }
 
@@ -127,6 +136,7 @@ impl Lengths {
                 return Poll::Pending;
             }
             self.stage = match self.stage {
+                Stage::Lines => self.draw_lines(scene, asked),
                 Stage::Transfer(task) => self.begin_transfer(scene, asked, task),
                 Stage::TransferSearch(task) => match self.search.advance(scene, budget, counters) {
                     Poll::Pending => return Poll::Pending,
@@ -174,12 +184,9 @@ impl Lengths {
     }
 
     fn begin_flood(&mut self, scene: &Scene, asked: &Asked, first: usize) -> Stage {
-        let source = match self.floods {
-            Floods::None => None,
-            Floods::PerObject => self.next_object(scene, asked, first),
-            Floods::PerRobot => {
-                (first..asked.robots.len()).find_map(|robot| Some((robot, asked.robots[robot]?)))
-            }
+        let source = match self.source {
+            Source::Floods => self.next_object(scene, asked, first),
+            Source::TransferAlone | Source::Lines => None,
         };
         let Some((source, from)) = source else {
             return Stage::Ready;
@@ -207,10 +214,6 @@ impl Lengths {
     }
 
     fn end_flood(&mut self, scene: &Scene, asked: &Asked, source: usize) -> Stage {
-        if self.floods == Floods::PerRobot {
-            self.look_up_robot(scene, asked, source);
-            return Stage::Flood(source + 1);
-        }
         let range = source * self.points..(source + 1) * self.points;
         self.field.keep(&mut self.kept[range]);
         self.flooded[source] =
@@ -231,15 +234,22 @@ impl Lengths {
             .charge((asked.robots.len() as u64).div_ceil(LOOKUPS_PER_UNIT));
     }
 
-    fn look_up_robot(&mut self, scene: &Scene, asked: &Asked, robot: usize) {
+    /// All lengths as if nothing stood in the way.
+    fn draw_lines(&mut self, scene: &Scene, asked: &Asked) -> Stage {
         for (task, places) in asked.tasks.iter().enumerate() {
-            if let Some(places) = places {
-                let grasp = places.initial + scene.objects[task].grasp;
-                let length = self.field.distance(scene, grasp);
-                self.transits[task * self.robots + robot] = length.unwrap_or(f64::INFINITY);
+            let Some(places) = *places else { continue };
+            let length = (places.goal - places.initial).norm();
+            self.transfers[task] = Some((places, length));
+            let grasp = places.initial + scene.objects[task].grasp;
+            for (robot, place) in asked.robots.iter().enumerate() {
+                if let Some(place) = place.filter(|_| self.transit_counts) {
+                    self.transits[task * self.robots + robot] = (grasp - place).norm();
+                }
             }
         }
-        self.meter
-            .charge((asked.tasks.len() as u64).div_ceil(LOOKUPS_PER_UNIT));
+        let pairs = asked.tasks.len() as u64 * asked.robots.len() as u64;
+        self.meter.charge(pairs.div_ceil(LOOKUPS_PER_UNIT));
+        // What that took is paid there; nothing is flooded.
+        Stage::Flood(0)
     }
 }

@@ -290,3 +290,29 @@ fn slices_change_neither_outcome_nor_cost() {
         assert_eq!(select(&mut sliced, &scene, &world, &table, units), expected);
     }
 }
+
+/// The robot's own room has a far task; a near one lies behind a wall with a detour.
+fn behind_a_wall(clutter: usize) -> Scene {
+    let side = 60.0;
+    let walls = [[10.0, 0.0, 10.2, 50.0]];
+    let mut trips = vec![
+        ([12.0, 5.0], Some([15.0, 5.0])),
+        ([2.0, 15.0], Some([5.0, 15.0])),
+    ];
+    // Nothing without a goal is ever selected.
+    trips.extend((0..clutter).map(|i| ([20.0 + (i % 20) as f64, 10.0 + (i / 20) as f64], None)));
+    room([0.0, 0.0, side, side], &walls, &[[9.0, 5.0]], &trips)
+}
+
+#[test]
+fn where_fields_would_not_fit_lengths_are_those_of_straight_lines() {
+    let taken = |clutter: usize| {
+        let scene = behind_a_wall(clutter);
+        let points = scene.lattice.len() * scene.objects.len();
+        let world = start(&scene);
+        let settings = settings(Method::NoAction);
+        (points > 1 << 24, select_once(&scene, &world, &settings))
+    };
+    assert_eq!(taken(0), (false, vec![Some(1)]));
+    assert_eq!(taken(60), (true, vec![Some(0)]));
+}

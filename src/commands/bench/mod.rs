@@ -8,6 +8,7 @@ mod compare;
 mod latency;
 mod paper;
 mod planning;
+mod scale;
 mod speed;
 
 use std::path::{Path, PathBuf};
@@ -30,6 +31,7 @@ pub(crate) fn main(workload: &Workload) -> Outcome {
         Workload::Compare(args) => compare::main(args),
         Workload::Latency(args) => latency::main(args),
         Workload::Planning(args) => planning::main(args),
+        Workload::Scale(args) => scale::main(args),
     }
 }
 
