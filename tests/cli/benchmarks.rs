@@ -150,3 +150,62 @@ fn options_out_of_range_name_the_allowed() {
     let help = rearrange(&["bench", "--help"]).assert().code(0);
     says(&stdout(&help), &["speed", "paper", "compare"]);
 }
+
+#[test]
+fn planning_finds_the_same_constraints_by_either_way_and_says_how_it_grows() {
+    let place = tempfile::tempdir().unwrap();
+    let out = place.path().to_str().unwrap();
+    let arguments = [
+        "bench",
+        "planning",
+        "--quick",
+        "--objects",
+        "5,10",
+        "--out",
+        out,
+    ];
+    let assert = ends_with(0, &arguments);
+    says(
+        &stdout(&assert),
+        &["easy constraints", "floods", "path search", "report.html"],
+    );
+    let results = results(place.path());
+    let names: Vec<_> = results["tables"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|table| &table["name"])
+        .collect();
+    assert!(names.iter().any(|name| **name == "growth"), "{names:?}");
+    assert!(names.iter().any(|name| **name == "speedups"), "{names:?}");
+    says(
+        &stderr(&ends_with(2, &["bench", "planning", "--objects", "0"])),
+        &["1", "1024"],
+    );
+}
+
+#[test]
+fn a_hall_is_run_to_its_end_and_says_who_was_engaged() {
+    let place = tempfile::tempdir().unwrap();
+    let out = place.path().to_str().unwrap();
+    let arguments = [
+        "bench",
+        "scale",
+        "--objects",
+        "16",
+        "--robots",
+        "4",
+        "--out",
+        out,
+    ];
+    let assert = ends_with(0, &arguments);
+    says(&stdout(&assert), &["ENGAGED", "solved", "4 took part"]);
+    assert_eq!(
+        results(place.path())["tables"][0]["rows"]
+            .as_array()
+            .unwrap()
+            .len(),
+        1
+    );
+    ends_with(2, &["bench", "scale", "--robots", "4"]);
+}
