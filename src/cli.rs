@@ -276,6 +276,9 @@ pub(crate) struct PaperArgs {
     /// All machines in one process, or one process per robot in lockstep
     #[arg(long, value_enum, default_value = "in-process")]
     pub(crate) driver: crate::run_options::Driver,
+    /// Judge and draw the runs of this earlier result again, instead of running
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["quick", "rooms", "robots", "units_per_second", "compute"])]
+    pub(crate) from: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) output: OutputArgs,
 }
@@ -356,7 +359,7 @@ pub(crate) struct LatencyArgs {
 #[command(after_help = "Example:\n  rearrange bench planning --quick\n\n\
                         Every step is timed in several rooms of each size, at a fixed \
                         density, and its work is counted; growth exponents follow. The complete \
-                        measurement takes about half an hour.")]
+                        measurement takes about a quarter of an hour.")]
 pub(crate) struct PlanningArgs {
     /// Numbers of objects, separated by commas
     #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = objects)]

@@ -99,7 +99,7 @@ impl Output {
         histograms: &[Tagged],
     ) -> Result<Vec<PathBuf>, FilesError> {
         let mut written = Vec::new();
-        let json = serde_json::to_string_pretty(results).map_err(io::Error::other);
+        let json = serde_json::to_string(results).map_err(io::Error::other);
         self.put(RESULTS, &mut written, |file| writeln!(file, "{}", json?))?;
         for table in &results.tables {
             let name = format!("{}.csv", table.name);

@@ -76,7 +76,7 @@ fn findings(page: &mut String, results: &Results) {
         let (class, word) = match finding.held {
             Some(true) => ("held", "held"),
             Some(false) => ("failed", "did not hold"),
-            None => ("soft", "not measured"),
+            None => ("soft", "undecided"),
         };
         let _ = writeln!(
             page,

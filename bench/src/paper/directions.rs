@@ -6,8 +6,8 @@
 //!
 //! Terms: a *pair* is two runs that differ in the method alone and are both solved; a ratio is
 //! the mean of the first method's times over that of the second's, with a 95 % bootstrap
-//! interval over the pairs. A direction holds where the whole interval lies on its side, and
-//! does not where it lies on the other.
+//! interval over the pairs. A direction holds where the whole interval lies on its side, does
+//! not where it lies on the other, and is undecided in between or without a pair.
 //!
 //! Source: rule 25; paper §V, Figs. 6 and 7.
 
@@ -50,6 +50,8 @@ struct Direction {
 struct Verdict {
     comparison: String,
     numbers: String,
+    /// Whether there was anything to compare.
+    measured: bool,
     held: Option<bool>,
 }
 
@@ -110,7 +112,7 @@ const DIRECTIONS: [Direction; 7] = [
         claim: "planning grows with the number of robots",
         judge: |runs| {
             [PAPERS, "restricted", "all", "all-literal"]
-                .map(|method| grows(runs, method, |run| run.planning_s))
+                .map(|method| grows(runs, method))
                 .into()
         },
     },
@@ -135,8 +137,12 @@ pub fn judge(table: &Table) -> (Vec<Finding>, Table) {
     for direction in &DIRECTIONS {
         for (world, runs) in &worlds {
             let verdicts = (direction.judge)(runs);
-            let known: Vec<_> = verdicts.iter().filter_map(|verdict| verdict.held).collect();
-            let held = (!known.is_empty()).then(|| known.iter().all(|held| *held));
+            let held = verdicts
+                .iter()
+                .filter(|verdict| verdict.measured)
+                .map(|verdict| verdict.held)
+                .reduce(both)
+                .flatten();
             for verdict in verdicts {
                 rows.push(vec![
                     direction.claim.into(),
@@ -144,19 +150,16 @@ pub fn judge(table: &Table) -> (Vec<Finding>, Table) {
                     world.compute.as_str().into(),
                     world.units_per_second.as_str().into(),
                     verdict.comparison.into(),
-                    verdict.held.map(word).into(),
+                    word(verdict.held).into(),
                     verdict.numbers.into(),
                 ]);
             }
             let claim = format!("{} rooms: {}", world.set, direction.claim);
             let place = format!("{}, {} units/s", world.compute, world.units_per_second);
-            let place = format!("{place}: {}", held.map_or("not measured", word));
+            let place = format!("{place}: {}", word(held));
             match findings.iter_mut().find(|finding| finding.claim == claim) {
                 Some(finding) => {
-                    finding.held = match (finding.held, held) {
-                        (Some(one), Some(other)) => Some(one && other),
-                        (one, other) => one.or(other),
-                    };
+                    finding.held = both(finding.held, held);
                     finding.evidence += &format!("; {place}");
                 }
                 None => findings.push(Finding {
@@ -170,8 +173,21 @@ pub fn judge(table: &Table) -> (Vec<Finding>, Table) {
     (findings, rows)
 }
 
-const fn word(held: bool) -> &'static str {
-    if held { "held" } else { "did not hold" }
+/// Both hold, or one does not, or nobody knows.
+const fn both(one: Option<bool>, other: Option<bool>) -> Option<bool> {
+    match (one, other) {
+        (Some(false), _) | (_, Some(false)) => Some(false),
+        (Some(true), Some(true)) => Some(true),
+        _ => None,
+    }
+}
+
+const fn word(held: Option<bool>) -> &'static str {
+    match held {
+        Some(true) => "held",
+        Some(false) => "did not hold",
+        None => "undecided",
+    }
 }
 
 fn comparisons() -> Table {
@@ -257,7 +273,7 @@ fn compared(
     what: &str,
     (one, other): (&str, &str),
     found: Option<(Estimate, usize)>,
-    holds: impl Fn(Estimate) -> bool,
+    judge: impl Fn(Estimate) -> Option<bool>,
 ) -> Verdict {
     Verdict {
         comparison: format!("{what}: {one} / {other}"),
@@ -268,20 +284,33 @@ fn compared(
                 format!("{value:.3} [{low:.3}, {high:.3}] over {pairs} pairs")
             },
         ),
-        held: found.map(|(ratio, _)| holds(ratio)),
+        measured: found.is_some(),
+        held: found.and_then(|(ratio, _)| judge(ratio)),
     }
 }
 
 fn less(runs: &Runs, one: &str, other: &str, what: &str, of: fn(&Run) -> f64) -> Verdict {
     let found = ratio(runs, one, other, of);
-    compared(what, (one, other), found, |ratio| ratio.high < 1.0)
+    compared(what, (one, other), found, |ratio| {
+        decided(ratio.high < 1.0, ratio.low > 1.0)
+    })
 }
 
 fn similar(runs: &Runs, other: &str, what: &str, of: fn(&Run) -> f64) -> Verdict {
     let found = ratio(runs, PAPERS, other, of);
     compared(what, (PAPERS, other), found, |ratio| {
-        ratio.low > 1.0 / SIMILAR && ratio.high < SIMILAR
+        let within = ratio.low > 1.0 / SIMILAR && ratio.high < SIMILAR;
+        decided(within, ratio.low > SIMILAR || ratio.high < 1.0 / SIMILAR)
     })
+}
+
+/// What an interval decides: nothing while it lies on both sides.
+const fn decided(held: bool, turned: bool) -> Option<bool> {
+    match (held, turned) {
+        (true, _) => Some(true),
+        (_, true) => Some(false),
+        _ => None,
+    }
 }
 
 fn solves_least(runs: &Runs) -> Verdict {
@@ -305,23 +334,39 @@ fn solves_least(runs: &Runs) -> Verdict {
     Verdict {
         comparison: "runs that end solved".to_owned(),
         numbers: words.join(", "),
+        measured: true,
         held: of("no-action")
             .zip(least)
             .map(|((_, share), least)| *share < least),
     }
 }
 
-/// Mean of a number over the solved runs, by number of robots.
-fn by_robots(runs: &Runs, method: &str, of: fn(&Run) -> f64) -> Vec<(f64, f64)> {
-    let mut groups: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
-    for run in runs.get(method).into_iter().flatten().map(|(_, run)| run) {
-        if run.solved {
-            groups.entry(run.robots as u64).or_default().push(of(run));
+/// Planning of all robots together, mean over the rooms that each of `methods` solves with every
+/// number of robots: numbers of robots, and seconds by method.
+fn planning_by_robots(runs: &Runs, methods: &[&str]) -> Vec<(f64, Vec<f64>)> {
+    let solved_everywhere = |room: &str| {
+        methods.iter().all(|method| {
+            let runs = runs.get(*method).into_iter().flatten();
+            let mut of_room = runs
+                .filter(|(situation, _)| situation[0] == room)
+                .peekable();
+            of_room.peek().is_some() && of_room.all(|(_, run)| run.solved)
+        })
+    };
+    let mut sums: BTreeMap<u64, Vec<Vec<f64>>> = BTreeMap::new();
+    for (index, method) in methods.iter().enumerate() {
+        for (situation, run) in runs.get(*method).into_iter().flatten() {
+            if solved_everywhere(&situation[0]) {
+                let robots = sums.entry(run.robots as u64).or_default();
+                robots.resize(methods.len(), Vec::new());
+                robots[index].push(run.planning_s * run.robots);
+            }
         }
     }
-    groups
-        .into_iter()
-        .filter_map(|(robots, numbers)| Some((robots as f64, mean(&numbers)?)))
+    let means =
+        |sums: Vec<Vec<f64>>| -> Option<Vec<f64>> { sums.iter().map(|sums| mean(sums)).collect() };
+    sums.into_iter()
+        .filter_map(|(robots, sums)| Some((robots as f64, means(sums)?)))
         .collect()
 }
 
@@ -338,28 +383,28 @@ fn rises(points: &[(f64, f64)]) -> Option<bool> {
     (points.len() > 1).then(|| points.windows(2).all(|pair| pair[0].1 < pair[1].1))
 }
 
-fn grows(runs: &Runs, method: &str, of: fn(&Run) -> f64) -> Verdict {
-    let points = by_robots(runs, method, of);
+fn grows(runs: &Runs, method: &str) -> Verdict {
+    let points: Vec<_> = planning_by_robots(runs, &[method])
+        .into_iter()
+        .map(|(robots, seconds)| (robots, seconds[0]))
+        .collect();
     Verdict {
-        comparison: format!("{method}, s (robots)"),
+        comparison: format!("{method}, all robots together, s (robots)"),
         numbers: series(&points),
+        measured: points.len() > 1,
         held: rises(&points),
     }
 }
 
 fn gap_grows(runs: &Runs, other: &str) -> Verdict {
-    let papers = by_robots(runs, PAPERS, |run| run.planning_s);
-    let others = by_robots(runs, other, |run| run.planning_s);
-    let gaps: Vec<_> = others
-        .iter()
-        .filter_map(|(robots, number)| {
-            let (_, base) = papers.iter().find(|(same, _)| same == robots)?;
-            Some((*robots, number - base))
-        })
+    let gaps: Vec<_> = planning_by_robots(runs, &[PAPERS, other])
+        .into_iter()
+        .map(|(robots, seconds)| (robots, seconds[1] - seconds[0]))
         .collect();
     Verdict {
-        comparison: format!("{other} less the paper's, s (robots)"),
+        comparison: format!("{other} less the paper's, all robots together, s (robots)"),
         numbers: series(&gaps),
+        measured: gaps.len() > 1,
         held: rises(&gaps),
     }
 }

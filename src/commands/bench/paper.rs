@@ -3,6 +3,7 @@
 //! Responsible for: the plan from the command line, handing real processes to the workload.
 //! Not responsible for: the runs and what follows from them (crate `bench`).
 
+use bench::files;
 use bench::paper::run::{ACTIVITIES, Measures, RunError, in_process};
 use bench::paper::{self, Plan, RUNS, VARIANTS, directions, figures};
 use bench::results::Results;
@@ -13,13 +14,17 @@ use shm_types::{Activity, Counters};
 use super::{Destination, Watch, command_line};
 use crate::cli::PaperArgs;
 use crate::drivers::processes::plan as process_plan;
-use crate::exit::{Failure, Outcome};
+use crate::exit::{Exit, Failure, Outcome};
 use crate::run_options::Driver;
 use crate::table;
 
 /// Runs the experiment.
 pub(crate) fn main(args: &PaperArgs) -> Outcome {
     let destination = Destination::create("paper", &args.output)?;
+    if let Some(earlier) = &args.from {
+        let results = files::read(earlier).map_err(|error| Failure::new(Exit::BadInput, error))?;
+        return finish(&destination, results);
+    }
     let plan = plan(args);
     let mut watch = Watch::start()?;
     let rooms = paper::rooms(&plan, &mut watch).map_err(Failure::system)?;
@@ -30,8 +35,16 @@ pub(crate) fn main(args: &PaperArgs) -> Outcome {
     };
     paper::measure(&plan, &rooms, &mut results, &mut watch, &mut run);
     drop(watch);
+    finish(&destination, results)
+}
+
+/// Judges and draws the runs, and leaves everything.
+fn finish(destination: &Destination, mut results: Results) -> Outcome {
     if let Some((findings, comparisons)) = paper::runs(&results).map(directions::judge) {
         results.findings = findings;
+        results
+            .tables
+            .retain(|table| table.name != comparisons.name);
         results.tables.push(comparisons);
     }
     let figures = figures::all(&results).map_err(Failure::system)?;
@@ -105,7 +118,7 @@ fn findings(results: &Results) -> String {
         let word = match finding.held {
             Some(true) => "held",
             Some(false) => "did not hold",
-            None => "not measured",
+            None => "undecided",
         };
         text += &format!("{word}: {}\n    {}\n", finding.claim, finding.evidence);
     }
