@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use hdrhistogram::Histogram;
-use hdrhistogram::serialization::V2Serializer;
+use hdrhistogram::serialization::V2DeflateSerializer;
 use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, Tag};
 
 use crate::figure::Figure;
@@ -163,9 +163,9 @@ fn write_csv(table: &Table, file: impl Write) -> io::Result<()> {
     writer.flush()
 }
 
-/// All histograms as one log in `HdrHistogram`'s V2 encoding, told apart by their tags.
+/// All histograms as one log in `HdrHistogram`'s compressed V2 encoding, told apart by their tags.
 fn write_log(results: &Results, histograms: &[Tagged], file: &mut impl Write) -> io::Result<()> {
-    let mut serializer = V2Serializer::new();
+    let mut serializer = V2DeflateSerializer::new();
     let mut log = IntervalLogWriterBuilder::new()
         .add_comment(&results.command)
         .with_start_time(SystemTime::now())
