@@ -255,7 +255,7 @@ pub(crate) struct PaperArgs {
     /// The paper's rooms and a few seeded ones, at two speeds: less than a minute
     #[arg(long)]
     pub(crate) quick: bool,
-    /// Seeded rooms beside the paper's six [default: 100, with --quick 6]
+    /// Seeded rooms beside the paper's six [default: 100, with --quick 3]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100_000))]
     pub(crate) rooms: Option<u32>,
     /// Seed of the first seeded room

@@ -74,7 +74,7 @@ impl Plan {
     #[must_use]
     pub fn quick() -> Self {
         Self {
-            rooms: 6,
+            rooms: FLOORS.len(),
             units_per_second: vec![100_000, 10_000_000],
             compute: vec![Compute::Own],
             ..Self::full()
