@@ -227,13 +227,16 @@ mod tests {
         let csv = fs::read_to_string(dir.join("runs.csv")).unwrap();
         assert_eq!(csv, "room,time_s\n\"a, \"\"b\"\"\",1.5\nc,\n");
         let log = fs::read(dir.join(LOG)).unwrap();
-        let tags: Vec<_> = IntervalLogIterator::new(&log)
+        let entries: Vec<_> = IntervalLogIterator::new(&log)
             .filter_map(|entry| match entry.unwrap() {
-                LogEntry::Interval(interval) => Some(interval.tag().unwrap().as_str().to_owned()),
+                LogEntry::Interval(interval) => Some(interval),
                 _ => None,
             })
             .collect();
-        assert_eq!(tags, ["age--4-robots"]);
+        assert_eq!(entries.len(), 1);
+        assert_eq!(entries[0].tag().unwrap().as_str(), "age--4-robots");
+        // The cookie of the compressed V2 encoding, the only one that log readers take.
+        assert!(entries[0].encoded_histogram().starts_with("HISTF"));
     }
 
     #[test]

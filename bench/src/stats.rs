@@ -69,11 +69,7 @@ fn interval<T: Copy>(sample: &[T], statistic: impl Fn(&[T]) -> Option<f64>) -> O
     let resamples: Vec<_> = (0..RESAMPLES)
         .filter_map(|_| statistic(&draw.of(sample)))
         .collect();
-    Some(Estimate {
-        value,
-        low: quantile(&resamples, OUTSIDE / 2.0)?,
-        high: quantile(&resamples, 1.0 - OUTSIDE / 2.0)?,
-    })
+    between(value, &resamples)
 }
 
 /// Ratio of the medians, `over` by `under`, with its interval; none if either is empty or the
@@ -89,11 +85,7 @@ pub fn ratio_interval(over: &[f64], under: &[f64]) -> Option<Estimate> {
     let resamples: Vec<_> = (0..RESAMPLES)
         .filter_map(|_| ratio(&draw.of(over), &draw.of(under)))
         .collect();
-    Some(Estimate {
-        value,
-        low: quantile(&resamples, OUTSIDE / 2.0)?,
-        high: quantile(&resamples, 1.0 - OUTSIDE / 2.0)?,
-    })
+    between(value, &resamples)
 }
 
 /// Ratio of the means of pairs, first by second, with its interval over resampled pairs; none
@@ -128,6 +120,15 @@ fn slope(points: &[(f64, f64)]) -> Option<f64> {
     let spread: f64 = xs.iter().map(|one| (one - x).powi(2)).sum();
     let product: f64 = points.iter().map(|(a, b)| (a - x) * (b - y)).sum();
     (spread > 1e-12).then(|| product / spread)
+}
+
+/// An estimate with the interval that its resamples span, but for those outside.
+fn between(value: f64, resamples: &[f64]) -> Option<Estimate> {
+    Some(Estimate {
+        value,
+        low: quantile(resamples, OUTSIDE / 2.0)?,
+        high: quantile(resamples, 1.0 - OUTSIDE / 2.0)?,
+    })
 }
 
 /// Draws resamples, with replacement.
