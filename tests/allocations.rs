@@ -90,7 +90,7 @@ fn the_count_counts() {
 #[test]
 fn complete_runs_allocate_nothing() {
     let scene = scene("h1");
-    for &method in Method::ALL {
+    for method in Method::PAPERS {
         let settings = Settings {
             method,
             ..Settings::default()
@@ -124,7 +124,7 @@ fn complete_runs_allocate_nothing() {
 #[test]
 fn four_robots_in_each_others_way_allocate_nothing() {
     let scene = scene("paper-17a");
-    for &method in Method::ALL {
+    for method in Method::PAPERS {
         let settings = Settings {
             method,
             ..Settings::default()

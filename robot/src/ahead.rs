@@ -39,6 +39,8 @@ impl Ahead {
         PathRequest {
             id,
             count: self.count as u32,
+            actions: 0,
+            reserved: 0,
             points: self.points,
         }
     }

@@ -76,10 +76,27 @@ words! {
         All = "all",
         /// None at all.
         NoAction = "no-action",
+        /// None of the paper's: the planner service plans ahead for all robots, and goes on
+        /// improving the plan while they move.
+        Anytime = "anytime",
     }
 }
 
 impl Method {
+    /// The paper's four (§IV).
+    pub const PAPERS: [Self; 4] = [
+        Self::GraspingAndRestricted,
+        Self::Restricted,
+        Self::All,
+        Self::NoAction,
+    ];
+
+    /// Whether robots follow the planner service's schedule instead of selecting tasks.
+    #[must_use]
+    pub const fn plans_ahead(self) -> bool {
+        matches!(self, Self::Anytime)
+    }
+
     /// Whether easy constraints are computed before each selection.
     #[must_use]
     pub const fn uses_easy(self) -> bool {

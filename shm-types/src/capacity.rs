@@ -9,6 +9,10 @@ pub const MAX_ROBOTS: usize = 128;
 pub const MAX_PATH_POINTS: usize = 32;
 /// Most hard constraints in force at once.
 pub const MAX_CONSTRAINTS: usize = 16_384;
+/// Most actions in a schedule, of all robots.
+pub const MAX_ACTIONS: usize = 16_384;
+/// Most waits in a schedule, of all actions.
+pub const MAX_WAITS: usize = 65_536;
 /// Most pieces of motion in one tick: each robot and what it carries, across three corners.
 pub const MAX_MOTIONS: usize = MAX_ROBOTS * 2 * 4;
 /// Most events in one tick.
@@ -19,6 +23,6 @@ pub const ROBOT_WORDS: usize = MAX_ROBOTS / 64;
 /// First word of every snapshot: "rearrang" in ASCII, little endian.
 pub const MAGIC: u64 = u64::from_le_bytes(*b"rearrang");
 /// Layout of the messages. Raised whenever one changes.
-pub const LAYOUT_VERSION: u32 = 1;
+pub const LAYOUT_VERSION: u32 = 2;
 
 const _: () = assert!(MAX_ROBOTS.is_multiple_of(64));

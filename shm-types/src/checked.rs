@@ -6,13 +6,13 @@
 use std::ops::Deref;
 
 use crate::capacity::{
-    LAYOUT_VERSION, MAGIC, MAX_CONSTRAINTS, MAX_EVENTS, MAX_MOTIONS, MAX_OBJECTS, MAX_PATH_POINTS,
-    MAX_ROBOTS,
+    LAYOUT_VERSION, MAGIC, MAX_ACTIONS, MAX_CONSTRAINTS, MAX_EVENTS, MAX_MOTIONS, MAX_OBJECTS,
+    MAX_PATH_POINTS, MAX_ROBOTS, MAX_WAITS,
 };
 use crate::{
     Activity, BodyKind, Command, ConstraintKind, ConstraintTable, ControlKind, ControlRequest,
     EventKind, FailureCause, Grip, HardAnswer, HardRequest, MotionBatch, NONE, Outcome, Phase,
-    PlannerReport, Point, RecorderReport, RoleKind, TaskStatus, WorldSnapshot,
+    PlannerReport, Point, RecorderReport, RoleKind, Schedule, TaskStatus, Verdict, WorldSnapshot,
 };
 
 /// Why a message was refused.
@@ -153,6 +153,18 @@ fn id(what: &'static str, id: u32, count: u32) -> Result<(), Invalid> {
     }
 }
 
+/// A range of a list of `capacity` live entries.
+fn within(what: &'static str, first: u32, length: u32, capacity: u32) -> Result<(), Invalid> {
+    match first.checked_add(length) {
+        Some(end) if end <= capacity => Ok(()),
+        _ => Err(Invalid::Count {
+            what,
+            count: first.saturating_add(length),
+            capacity: capacity as usize,
+        }),
+    }
+}
+
 fn id_or_none(what: &'static str, value: u32, count: u32) -> Result<(), Invalid> {
     if value == NONE {
         Ok(())
@@ -270,6 +282,52 @@ impl Validate for ConstraintTable {
     }
 }
 
+impl Validate for Schedule {
+    fn validate(&self, counts: Counts) -> Result<(), Invalid> {
+        if self.robot_count != counts.robots {
+            return Err(Invalid::Inconsistent {
+                what: "the number of robots",
+            });
+        }
+        count("robots", self.robot_count, MAX_ROBOTS)?;
+        count("actions", self.action_count, MAX_ACTIONS)?;
+        count("waits", self.wait_count, MAX_WAITS)?;
+        for part in &self.robots[..self.robot_count as usize] {
+            flag("complete", part.complete)?;
+            within(
+                "a robot's actions",
+                part.offset,
+                part.count,
+                self.action_count,
+            )?;
+            if part.first.checked_add(part.count).is_none() {
+                return Err(Invalid::Inconsistent {
+                    what: "the number of an action",
+                });
+            }
+        }
+        for action in &self.actions[..self.action_count as usize] {
+            finite("the end of an action", action.to)?;
+            match Grip::decode(action.grip)? {
+                Grip::Keep => id_or_none("an action's object", action.object, counts.objects)?,
+                Grip::Grasp | Grip::Release => {
+                    id("an action's object", action.object, counts.objects)?;
+                }
+            }
+            within(
+                "an action's waits",
+                action.first_wait,
+                action.waits,
+                self.wait_count,
+            )?;
+        }
+        for wait in &self.waits[..self.wait_count as usize] {
+            id("a robot waited for", wait.robot, counts.robots)?;
+        }
+        Ok(())
+    }
+}
+
 impl Validate for HardRequest {
     fn validate(&self, counts: Counts) -> Result<(), Invalid> {
         id("robot", self.robot, counts.robots)?;
@@ -287,7 +345,8 @@ impl Validate for HardAnswer {
 
 impl Validate for PlannerReport {
     fn validate(&self, _counts: Counts) -> Result<(), Invalid> {
-        flag("busy", self.busy)
+        flag("busy", self.busy)?;
+        Verdict::decode(self.verdict).map(|_| ())
     }
 }
 

@@ -27,6 +27,11 @@ pub struct PathRequest {
     pub id: u32,
     /// Live points.
     pub count: u32,
+    /// Actions of the robot's schedule that are granted to it once all of this is: each point but
+    /// the first ends one. Always 0 where no schedule is followed.
+    pub actions: u32,
+    /// Always 0.
+    pub reserved: u32,
     /// Corner points; unused ones are zero.
     pub points: [Point; MAX_PATH_POINTS],
 }

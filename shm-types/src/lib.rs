@@ -23,6 +23,7 @@ mod id;
 mod motion;
 mod planner;
 mod point;
+mod schedule;
 mod snapshot;
 
 pub use checked::{Checked, Counts, Invalid, Validate};
@@ -32,9 +33,10 @@ pub use hash::StateHash;
 pub use id::{NONE, index};
 pub use motion::{BodyKind, EventKind, EventRecord, MotionBatch, MotionRecord, RecorderReport};
 pub use planner::{
-    Constraint, ConstraintKind, ConstraintTable, HardAnswer, HardRequest, PlannerReport,
+    Constraint, ConstraintKind, ConstraintTable, HardAnswer, HardRequest, PlannerReport, Verdict,
 };
 pub use point::Point;
+pub use schedule::{Action, RobotSchedule, Schedule, Wait};
 pub use snapshot::{
     Activity, FailureCause, Grip, ObjectState, Outcome, Phase, RobotState, SnapshotHeader,
     TaskStatus, WorldSnapshot,

@@ -16,6 +16,19 @@ tag! {
     }
 }
 
+tag! {
+    /// What a planner that plans ahead says of the run's end.
+    pub enum Verdict {
+        /// Nothing: it has a plan, looks for one, or the method does not plan ahead.
+        Open = 0,
+        /// It has looked as far as it may, and found no plan.
+        NotFound = 1,
+        /// There is none: every arrangement that can be reached was looked at, in the model that
+        /// it plans in.
+        Exhausted = 2,
+    }
+}
+
 /// A hard constraint: task `before` must be completed before task `after` is selected (rule 13).
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, FromBytes, IntoBytes, Immutable, KnownLayout,
@@ -108,8 +121,8 @@ pub struct PlannerReport {
     /// Constraints found that the newest table has no room for: if not 0, the run is no longer
     /// the method it claims to be.
     pub constraints_dropped: u32,
-    /// Always 0.
-    pub reserved: u32,
+    /// A [`Verdict`]: what the planner knows of the run's end.
+    pub verdict: u32,
     /// Work done so far.
     pub counters: Counters,
 }

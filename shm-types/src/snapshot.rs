@@ -185,6 +185,10 @@ pub struct RobotState {
     pub request_open: u32,
     /// Live points in `grant`.
     pub grant_count: u32,
+    /// Actions of its schedule that are granted to it, counted from the start of the run.
+    pub actions: u32,
+    /// Always 0.
+    pub reserved: u32,
     /// Corner points of the granted path still ahead, from the next one on: `position`, then
     /// these, is the polyline it will move along. Unused points are zero.
     pub grant: [Point; MAX_PATH_POINTS],
@@ -212,6 +216,10 @@ pub struct ObjectState {
     pub epoch_status: u32,
     /// Failures reported of this task so far.
     pub failures: u32,
+    /// How often it has been put down so far.
+    pub put_downs: u32,
+    /// Always 0.
+    pub reserved: u32,
     /// Bit r set: barred for robot r (rule 21).
     pub barred: [u64; ROBOT_WORDS],
     /// `barred` as it was when this epoch opened.
@@ -300,6 +308,6 @@ impl WorldSnapshot {
     }
 }
 
-const _: () = assert!(size_of::<RobotState>() == 80 + 16 * MAX_PATH_POINTS);
-const _: () = assert!(size_of::<ObjectState>() == 104);
+const _: () = assert!(size_of::<RobotState>() == 88 + 16 * MAX_PATH_POINTS);
+const _: () = assert!(size_of::<ObjectState>() == 112);
 const _: () = assert!(size_of::<WorldSnapshot>() < 200 * 1024);

@@ -38,6 +38,7 @@ pub(crate) fn take(
     let sound = stays_inside(scene, &path) && crosses_no_wall(scene, bodies, robot, &path);
     if sound {
         robot.rest = path;
+        robot.actions = request.actions;
     }
     sound
 }

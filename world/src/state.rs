@@ -163,6 +163,8 @@ pub(crate) struct Robot {
     pub(crate) request: u32,
     /// Tick at which it was taken: its age in the queue.
     pub(crate) request_tick: u64,
+    /// Actions of its schedule that are granted once all that is asked for is.
+    pub(crate) actions: u32,
     /// Whether that request has been counted as refused.
     pub(crate) refused: bool,
     pub(crate) failure: Option<PendingFailure>,
@@ -196,6 +198,7 @@ impl Robot {
             cut: false,
             request: 0,
             request_tick: 0,
+            actions: 0,
             refused: false,
             failure: None,
             last_failure: 0,
@@ -227,8 +230,14 @@ impl Robot {
         self.link.live && matches!(self.hand, Hand::Empty) && self.claim.is_none()
     }
 
+    /// Actions of its schedule that are granted to it: each point asked for ends one.
+    pub(crate) fn granted_actions(&self) -> u32 {
+        self.actions.saturating_sub(self.rest.points().len() as u32)
+    }
+
     /// Drops what was asked for and not granted.
-    pub(crate) const fn drop_rest(&mut self) {
+    pub(crate) fn drop_rest(&mut self) {
+        self.actions = self.granted_actions();
         self.rest.clear();
         self.cut = false;
     }
@@ -246,6 +255,8 @@ pub(crate) struct Object {
     pub(crate) status: TaskStatus,
     pub(crate) epoch_status: TaskStatus,
     pub(crate) failures: u32,
+    /// How often it has been put down.
+    pub(crate) put_downs: u32,
     pub(crate) barred: [u64; ROBOT_WORDS],
     pub(crate) epoch_barred: [u64; ROBOT_WORDS],
 }
@@ -265,6 +276,7 @@ impl Object {
             status,
             epoch_status: status,
             failures: 0,
+            put_downs: 0,
             barred: [0; ROBOT_WORDS],
             epoch_barred: [0; ROBOT_WORDS],
         }

@@ -19,6 +19,7 @@ impl World {
         let put = &mut self.objects[object];
         put.position = place_of(put.position, put.goal);
         put.rest = put.position;
+        put.put_downs += 1;
         put.holder = None;
         put.claimed_by = None;
         let done = put.goal.is_none_or(|goal| is_at(put.position, goal));

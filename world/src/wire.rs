@@ -89,6 +89,7 @@ fn write_robot(out: &mut RobotState, robot: &Robot) {
     out.request = robot.request;
     out.request_open = u32::from(!robot.rest.is_empty());
     out.grant_count = id(grant.len());
+    out.actions = robot.granted_actions();
     for (out, point) in out.grant.iter_mut().zip(grant) {
         *out = scene::point(*point);
     }
@@ -106,6 +107,8 @@ fn write_object(out: &mut shm_types::ObjectState, object: &Object) {
         status: object.status.code(),
         epoch_status: object.epoch_status.code(),
         failures: object.failures,
+        put_downs: object.put_downs,
+        reserved: 0,
         barred: object.barred,
         epoch_barred: object.epoch_barred,
     };
@@ -129,6 +132,7 @@ fn hash_command(command: &Command, hash: &mut StateHash) {
         command.grip,
         command.path.id,
         command.path.count,
+        command.path.actions,
     ]);
     hash.add(&command.claim);
     hash.add(&command.failure);

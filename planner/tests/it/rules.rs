@@ -193,13 +193,13 @@ proptest! {
     ) {
         let scene = narrow();
         // Each robot has a selection of its own, is as fast as it is, and has seen other epochs.
-        for method in Method::ALL {
-            let mut robots = [(); 3].map(|()| Selection::new(&scene, &settings(*method)));
+        for method in Method::PAPERS {
+            let mut robots = [(); 3].map(|()| Selection::new(&scene, &settings(method)));
             for (epoch, situation) in situations.iter().enumerate() {
                 let world = situation.world(&scene);
                 let edges: Vec<_> = situation.edges.iter().copied().collect();
                 let table = table_of(&edges);
-                let expected = by_definition(&scene, &world, &table, *method);
+                let expected = by_definition(&scene, &world, &table, method);
                 for (robot, selection) in robots.iter_mut().enumerate() {
                     if robot + epoch == 2 {
                         continue; // This one has slept through the epoch.
