@@ -31,6 +31,16 @@ impl Places {
         })
     }
 
+    /// The places of all tasks as a run begins: none for clutter.
+    pub fn at_start(scene: &Scene) -> impl Iterator<Item = Option<Self>> {
+        scene.objects.iter().map(|object| {
+            object.goal.map(|goal| Self {
+                initial: object.start,
+                goal,
+            })
+        })
+    }
+
     /// Where the object stands in a test.
     pub(crate) fn at(&self, goal: bool) -> Vec2 {
         if goal { self.goal } else { self.initial }

@@ -11,6 +11,8 @@ mod floods;
 #[cfg(test)]
 mod hard;
 #[cfg(test)]
+mod legs;
+#[cfg(test)]
 mod obstacles;
 #[cfg(test)]
 mod priority;
