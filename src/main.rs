@@ -4,7 +4,6 @@ mod cli;
 mod commands;
 mod drivers;
 mod exit;
-mod lower_bound;
 mod output;
 mod progress;
 mod result;

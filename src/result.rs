@@ -53,6 +53,9 @@ pub(crate) struct RunResult {
     pub(crate) idle_s: Option<f64>,
     /// No plan on this lattice can be shorter (rule 32).
     pub(crate) lower_bound_s: Option<f64>,
+    /// R: the best plan that moves each object once takes so long if nothing is ever in the way
+    /// (rule 32); nothing if it is not known.
+    pub(crate) yardstick_s: Option<f64>,
     pub(crate) times: Option<Times>,
     pub(crate) counts: Counts,
     pub(crate) checker: Option<Checker>,

@@ -79,8 +79,11 @@ fn rows(result: &RunResult) -> Vec<(&'static str, String)> {
         return rows;
     }
     if let Some(makespan) = result.makespan_s {
+        let yardstick = result.yardstick_s.map_or_else(String::new, |yardstick| {
+            format!("; with nothing ever in the way: {yardstick:.2} s")
+        });
         let bound = result.lower_bound_s.map_or_else(String::new, |bound| {
-            format!(" (no plan is shorter than {bound:.2} s)")
+            format!(" (no plan is shorter than {bound:.2} s{yardstick})")
         });
         rows.push(("makespan", format!("{makespan:.2} s of world time{bound}")));
     }

@@ -12,12 +12,11 @@
 //!
 //! How: motion is reversible, so one flood from each home answers approaches and ways home, and
 //! one from each grasp all turns to it; a transfer is one path search. That is m + n floods and n
-//! searches for m robots and n tasks; m more where robots do not start from home, and no floods
-//! from grasps where there is one task alone.
+//! searches for m robots and n tasks, and m floods more where robots do not start from home.
 
 use std::task::Poll;
 
-use scene::{Budget, CONTACT_M, ROBOT_ALONE, Scene, UNITS_PER_RESET, Vec2};
+use scene::{Budget, ROBOT_ALONE, Scene, UNITS_PER_RESET, Vec2};
 use shm_types::Counters;
 
 use crate::field::DistanceField;
@@ -57,6 +56,28 @@ impl Legs {
         search.legs
     }
 
+    /// Straight ways at 1 m/s between points of an open plane, for tests: robots start from
+    /// `homes`, each task has a grasp and a release, m.
+    #[cfg(test)]
+    pub(crate) fn in_the_open(homes: &[Vec2], tasks: &[(Vec2, Vec2)]) -> Self {
+        let ways = |from: Vec<Vec2>, to: Vec<Vec2>| -> Vec<f64> {
+            let pairs = from.iter().flat_map(|a| to.iter().map(move |b| (a, b)));
+            pairs.map(|(a, b)| (a - b).norm()).collect()
+        };
+        let grasps = || tasks.iter().map(|task| task.0).collect();
+        let releases = || tasks.iter().map(|task| task.1).collect();
+        Self {
+            tasks: (0..tasks.len()).collect(),
+            objects: tasks.len(),
+            robots: homes.len(),
+            approach_s: ways(homes.to_vec(), grasps()),
+            transfer_s: tasks.iter().map(|(a, b)| (a - b).norm()).collect(),
+            turn_s: ways(releases(), grasps()),
+            home_s: ways(releases(), homes.to_vec()),
+            between_s: ways(homes.to_vec(), homes.to_vec()),
+        }
+    }
+
     /// The tasks they are about, ascending: objects with a goal that are not there yet.
     #[must_use]
     pub fn tasks(&self) -> &[usize] {
@@ -81,7 +102,8 @@ impl Legs {
         known(self.transfer_s[task])
     }
 
-    /// From the release of task `from` to the grasp of task `to`, which is another one.
+    /// From the release of task `from` to the grasp of task `to`; of its own, too: nobody goes
+    /// there, but bounds ask for it.
     #[must_use]
     pub fn turn_s(&self, from: usize, to: usize) -> Option<f64> {
         known(self.turn_s[from * self.objects + to])
@@ -160,11 +182,11 @@ impl LegSearch {
         places: impl IntoIterator<Item = Option<Places>>,
         starts: &[Vec2],
     ) -> Self {
-        let mut places: Vec<_> = places.into_iter().collect();
+        let mut places: Vec<_> = places
+            .into_iter()
+            .map(|places| places.filter(Places::is_open))
+            .collect();
         places.resize(scene.objects.len(), None);
-        for place in &mut places {
-            place.take_if(|at| (at.goal - at.initial).amax() <= CONTACT_M);
-        }
         let tasks = (0..places.len()).filter(|&task| places[task].is_some());
         let (objects, robots) = (places.len(), scene.homes.len());
         let unknown = |count: usize| vec![f64::INFINITY; count];
@@ -238,7 +260,6 @@ impl LegSearch {
             Stage::Start(robot) if scene.homes.get(robot) == Some(&from) => {
                 return self.following();
             }
-            Stage::Grasp(_) if self.legs.tasks.len() < 2 => return self.after_all(),
             Stage::Transfer(index) => {
                 let task = self.legs.tasks[index];
                 let to = self.release(scene, task);
@@ -327,10 +348,8 @@ impl LegSearch {
     fn read_grasp(&mut self, scene: &Scene, to: usize) {
         for index in 0..self.legs.tasks.len() {
             let from = self.legs.tasks[index];
-            if from != to {
-                let release = self.release(scene, from);
-                self.legs.turn_s[from * self.legs.objects + to] = self.read(scene, release);
-            }
+            let release = self.release(scene, from);
+            self.legs.turn_s[from * self.legs.objects + to] = self.read(scene, release);
         }
         self.charge(self.legs.tasks.len());
     }

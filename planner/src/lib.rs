@@ -17,8 +17,10 @@
 #![forbid(unsafe_code)]
 
 mod assignment;
+mod bounds;
 mod certificate;
 pub mod easy;
+mod event;
 mod feasibility;
 mod field;
 mod floods;
@@ -38,8 +40,10 @@ mod search;
 mod selection;
 mod service;
 
+pub use bounds::{BoundLimits, Bounds, MOST_ROBOTS, MOST_TASKS, Yardstick};
 pub use certificate::certificate;
 pub use easy::EasyConstraints;
+pub use event::{Event, Precedence};
 pub use field::DistanceField;
 pub use floods::{FloodWork, Floods};
 pub use hard::{Found, HardConstraints};

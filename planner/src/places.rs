@@ -7,7 +7,7 @@
 //!
 //! Terms: a task is *open* if it is a node of the priority graph: not finished, and with a goal.
 
-use scene::{Scene, Vec2, vec};
+use scene::{CONTACT_M, Scene, Vec2, vec};
 use shm_types::{ObjectState, TaskStatus};
 
 /// Initial and goal place of an open task's object, m.
@@ -29,6 +29,12 @@ impl Places {
             initial: vec(object.rest),
             goal: vec(object.goal),
         })
+    }
+
+    /// Whether the object still has to be brought anywhere.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        (self.goal - self.initial).amax() > CONTACT_M
     }
 
     /// The places of all tasks as a run begins: none for clutter.

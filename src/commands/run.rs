@@ -5,6 +5,7 @@
 //! Not responsible for: any of these steps.
 
 use node::RunOptions;
+use planner::{BoundLimits, Bounds};
 use scene::{Infeasible, Scene};
 use shm_types::Outcome as RunOutcome;
 use trace::CheckReport;
@@ -15,7 +16,7 @@ use crate::progress::Progress;
 use crate::result::{Checker, Counts, Ending, Options, RunResult, Times, hex, seconds};
 use crate::run_options::{Driver, RunArgs};
 use crate::scenario::Loaded;
-use crate::{lower_bound, output, result, scenario, table};
+use crate::{output, result, scenario, table};
 
 /// Violations quoted in the result.
 const MOST_QUOTED: usize = 10;
@@ -101,6 +102,7 @@ fn frame(scene: &Scene, args: &RunArgs, options: &RunOptions) -> RunResult {
         waiting_s: None,
         idle_s: None,
         lower_bound_s: None,
+        yardstick_s: None,
         times: None,
         counts: Counts::default(),
         checker: None,
@@ -129,6 +131,7 @@ fn complete(frame: RunResult, scene: &Scene, args: &RunArgs, finished: Finished)
     let mean = times.as_ref().map(|times| times.mean);
     let checker = finished.check.as_ref().map(checker);
     let (outcome, reason) = ending(&finished, checker.as_ref());
+    let bounds = Bounds::of(scene, BoundLimits::default());
     RunResult {
         date: bench::machine::date_utc(),
         outcome,
@@ -138,7 +141,8 @@ fn complete(frame: RunResult, scene: &Scene, args: &RunArgs, finished: Finished)
         planning_s: mean.map(|mean| mean.computing_s),
         waiting_s: mean.map(|mean| mean.waiting_s),
         idle_s: mean.map(|mean| mean.idle_s),
-        lower_bound_s: lower_bound::lower_bound_s(scene),
+        lower_bound_s: bounds.as_ref().map(Bounds::best_s),
+        yardstick_s: bounds.as_ref().and_then(Bounds::r_s),
         times,
         counts: counts(&finished),
         checker,

@@ -28,6 +28,7 @@ fn is_complete(result: &Value) {
         "planning_s",
         "waiting_s",
         "lower_bound_s",
+        "yardstick_s",
         "ticks",
         "wall_s",
     ];
@@ -95,7 +96,8 @@ fn a_solved_run_has_every_field_and_its_times_sum_up() {
     assert_eq!(result["reason"], Value::Null);
     assert_eq!(result["driver"], "in-process");
     assert!(number(&result["counts"]["hard_constraints"]) >= 1.0);
-    assert!(number(&result["lower_bound_s"]) <= number(&result["makespan_s"]));
+    assert!(number(&result["lower_bound_s"]) <= number(&result["yardstick_s"]));
+    assert!(number(&result["yardstick_s"]) <= number(&result["makespan_s"]));
     for robot in result["times"]["per_robot"].as_array().unwrap() {
         let sum: f64 = robot.as_object().unwrap().values().map(number).sum();
         assert!(

@@ -121,8 +121,8 @@ fn what_is_no_task_has_no_legs() {
     assert_eq!(legs.tasks(), [0]);
     assert_eq!(legs.transfer_s(0), Some(4.0));
     assert_eq!((legs.transfer_s(1), legs.transfer_s(2)), (None, None));
-    // One home and one transfer: nobody turns to another task.
-    assert_eq!(counters.path_plans, 2);
+    // One home, one grasp and one transfer.
+    assert_eq!(counters.path_plans, 3);
 }
 
 #[test]
