@@ -59,6 +59,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let input = RobotInput {
                 snapshot: seen,
                 table: Checked::new(&*table, counts)?,
+                schedule: None,
                 answer: None,
             };
             let _asked = robot.step(&scene, input, units, command);
@@ -72,6 +73,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             commands: &commands,
             planner: None,
             table: None,
+            schedule: None,
             control: &[],
         };
         world.step(&scene, input, &mut motion);

@@ -130,6 +130,10 @@ pub(crate) struct Counts {
     pub(crate) selections: u64,
     pub(crate) selection_conflicts: u64,
     pub(crate) grants_refused: u64,
+    /// Path requests that were no sound ones: a plan through a wall, for example.
+    pub(crate) invalid_requests: u64,
+    /// Schedules that the world refused whole.
+    pub(crate) schedules_refused: u64,
     pub(crate) deadline_misses: u64,
     pub(crate) restarts: u64,
     pub(crate) lost_commands: u64,

@@ -112,6 +112,8 @@ impl ActivityReport {
 pub struct WorldReport {
     /// Code of the [`Outcome`].
     pub outcome: u32,
+    /// Code of the [`Verdict`](shm_types::Verdict): what the planner said of the run's end.
+    pub verdict: u32,
     /// Why it is stuck, failed or violated, if it is.
     pub reason: Option<String>,
     /// Ticks made.
@@ -126,6 +128,10 @@ pub struct WorldReport {
     pub task_failures: u64,
     /// Path requests refused because they contradicted the state.
     pub grants_refused: u64,
+    /// Path requests that were no sound ones: dropped.
+    pub invalid_requests: u64,
+    /// Schedules refused whole.
+    pub schedules_refused: u64,
     /// Claims on one task by two robots in one tick.
     pub selection_conflicts: u64,
     /// Broken invariants.

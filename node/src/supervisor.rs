@@ -169,7 +169,7 @@ impl<'p> Run<'p> {
         let counts = scene.counts();
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         plan.options.check(counts, cores)?;
-        let topics = Topics::of(counts, plan.options.monitors);
+        let topics = Topics::of(counts, plan.options.settings.method, plan.options.monitors);
         let participants = u64::from(counts.robots + plan.options.monitors) + 4;
         shared_memory::reserve(topics.bytes(), participants)?;
         let signals = Signals::watch().map_err(RunError::Signals)?;

@@ -12,9 +12,10 @@ mod tests;
 
 use std::marker::PhantomData;
 
+use scene::Method;
 use shm_types::{
     Command, ConstraintTable, ControlReply, ControlRequest, Counts, HardAnswer, HardRequest,
-    MotionBatch, PlannerReport, RecorderReport, WorldSnapshot,
+    MotionBatch, PlannerReport, RecorderReport, Schedule, WorldSnapshot,
 };
 
 use crate::calls::{CallService, Calls};
@@ -43,6 +44,8 @@ pub(crate) struct Topics {
     pub(crate) planner: Topic<PlannerReport>,
     /// Planner → robots, world: hard constraints.
     pub(crate) constraints: Topic<ConstraintTable>,
+    /// Planner → robots, world, if the method plans ahead: who does what next, after whom.
+    pub(crate) schedule: Option<Topic<Schedule>>,
     /// World → recorder: all motion and events.
     pub(crate) motion: Topic<MotionBatch>,
     /// Recorder → world, supervisor: how far it has come.
@@ -66,17 +69,19 @@ pub(crate) struct HeldTopics {
     pub(crate) control: CallService<ControlRequest, ControlReply>,
     pub(crate) wake_world: WakeService,
     _constraints: Service<ConstraintTable>,
+    _schedule: Option<Service<Schedule>>,
     _motion: Service<MotionBatch>,
     _hard: CallService<HardRequest, HardAnswer>,
     _wake_participants: WakeService,
 }
 
 impl Topics {
-    /// The table, for a run of this size with room for `monitors` watching programs.
+    /// The table, for a run of this size and method with room for `monitors` watching programs.
     #[must_use]
-    pub(crate) const fn of(counts: Counts, monitors: u32) -> Self {
+    pub(crate) const fn of(counts: Counts, method: Method, monitors: u32) -> Self {
         let robots = counts.robots as usize;
         let watch = monitors as usize;
+        let readers = robots + 1;
         let all = robots + OTHER_NODES + watch;
         Self {
             //                   name         nodes writers readers          history buffer borrowed
@@ -84,6 +89,11 @@ impl Topics {
             command: topic("command", all, robots, 2, 0, 2, 2),
             planner: topic("planner", all, 1, 2 + watch, 1, 1, 2),
             constraints: topic("constraints", all, 1, robots + 1 + watch, 2, 2, 3),
+            schedule: if method.plans_ahead() {
+                Some(topic("schedule", all, 1, readers, 2, 2, 3))
+            } else {
+                None
+            },
             motion: topic("motion", all, 1, 1, 0, MOTION_BUFFER, 2),
             recorder: topic("recorder", all, 1, 2, 1, 1, 2),
             //             name       nodes clients
@@ -102,10 +112,24 @@ impl Topics {
             + self.command.bytes()
             + self.planner.bytes()
             + self.constraints.bytes()
+            + self.schedule.as_ref().map_or(0, Topic::bytes)
             + self.motion.bytes()
             + self.recorder.bytes()
             + self.hard.bytes()
             + self.control.bytes()
+    }
+
+    /// Makes or opens the topic of schedules; nothing if the method does not plan ahead.
+    ///
+    /// # Errors
+    /// As those of the other topics.
+    pub(crate) fn schedule_service(
+        &self,
+        node: &IpcNode,
+        access: Access,
+    ) -> Result<Option<Service<Schedule>>, TopicError> {
+        let topic = self.schedule.as_ref();
+        topic.map(|topic| topic.service(node, access)).transpose()
     }
 
     /// Makes every topic.
@@ -121,6 +145,7 @@ impl Topics {
             control: self.control.service(node, Access::Create)?,
             wake_world: self.wake_world.service(node, Access::Create)?,
             _constraints: self.constraints.service(node, Access::Create)?,
+            _schedule: self.schedule_service(node, Access::Create)?,
             _motion: self.motion.service(node, Access::Create)?,
             _hard: self.hard.service(node, Access::Create)?,
             _wake_participants: self.wake_participants.service(node, Access::Create)?,

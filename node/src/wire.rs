@@ -11,7 +11,7 @@ use std::mem::MaybeUninit;
 use iceoryx2::prelude::ZeroCopySend;
 use shm_types::{
     Command, ConstraintTable, ControlReply, ControlRequest, HardAnswer, HardRequest, MotionBatch,
-    PlannerReport, RecorderReport, WorldSnapshot,
+    PlannerReport, RecorderReport, Schedule, WorldSnapshot,
 };
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
@@ -35,6 +35,7 @@ messages!(
     Command,
     PlannerReport,
     ConstraintTable,
+    Schedule,
     HardRequest,
     HardAnswer,
     ControlRequest,

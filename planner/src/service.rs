@@ -2,7 +2,8 @@
 //! event.
 //!
 //! Responsible for: the queue of requests, when which tests are made (the table before rule 23),
-//! versions of the constraint table, answers.
+//! versions of the constraint table, answers; for methods that plan ahead, when a schedule is
+//! published.
 //! Not responsible for: the tests (`hard`), how messages travel (crate `node`).
 //!
 //! A request is known by its robot, incarnation and failure id: asked again while it waits or is
@@ -14,8 +15,8 @@ use std::task::Poll;
 use scene::{Budget, Method, Scene, Settings};
 use shm_types::capacity::MAX_CONSTRAINTS;
 use shm_types::{
-    Checked, ConstraintTable, Counters, HardAnswer, HardRequest, PlannerReport, StateHash,
-    WorldSnapshot, zeroed,
+    Checked, ConstraintTable, Counters, HardAnswer, HardRequest, PlannerReport, Schedule,
+    StateHash, WorldSnapshot, zeroed,
 };
 
 use crate::hard::{Found, HardConstraints};
@@ -38,6 +39,8 @@ pub struct PlannerOutput<'a> {
     pub answers: &'a [HardAnswer],
     /// A new version of the table, to be seen in the next tick.
     pub table: Option<&'a ConstraintTable>,
+    /// A new version of the schedule, likewise. Only of methods that plan ahead.
+    pub schedule: Option<&'a Schedule>,
 }
 
 /// What is being worked on.
@@ -64,6 +67,10 @@ pub struct Planner {
     table: Box<ConstraintTable>,
     /// Constraints it has no room for.
     dropped: u32,
+    /// The schedule of a method that plans ahead, once there is one.
+    schedule: Option<Box<Schedule>>,
+    /// Its version when it was published last; 0 if it never was.
+    schedule_version: u32,
     counters: Counters,
     /// Everything decided so far, in order.
     journal: StateHash,
@@ -87,8 +94,20 @@ impl Planner {
             answers: Vec::with_capacity(3 * robots),
             table,
             dropped: 0,
+            schedule: None,
+            schedule_version: 0,
             counters: Counters::default(),
             journal: StateHash::new(),
+        }
+    }
+
+    /// A planner whose plan is made already: it publishes `schedule` in its first step, numbered
+    /// and dated as is due then.
+    #[must_use]
+    pub fn with_schedule(scene: &Scene, settings: Settings, schedule: Box<Schedule>) -> Self {
+        Self {
+            schedule: Some(schedule),
+            ..Self::new(scene, settings)
         }
     }
 
@@ -103,7 +122,9 @@ impl Planner {
         }
         let repeated = self.answers.len();
         let mut budget = Budget::new(units);
-        let publish = self.work(scene, input.snapshot, &mut budget);
+        let plans_ahead = self.method.plans_ahead();
+        let publish = !plans_ahead && self.work(scene, input.snapshot, &mut budget);
+        let reschedule = plans_ahead && self.date_schedule(header.schedule_version, header.tick);
         self.counters.units += budget.spent();
         if publish {
             self.write_table(header.tick + 1);
@@ -117,6 +138,7 @@ impl Planner {
             report: self.report(input.snapshot),
             answers: &self.answers,
             table: publish.then_some(&*self.table),
+            schedule: self.schedule.as_deref().filter(|_| reschedule),
         }
     }
 
@@ -124,6 +146,21 @@ impl Planner {
     #[must_use]
     pub fn table(&self) -> &ConstraintTable {
         &self.table
+    }
+
+    /// Numbers and dates the schedule, if there is one that was not published yet.
+    fn date_schedule(&mut self, in_force: u32, tick: u64) -> bool {
+        let Some(schedule) = self.schedule.as_deref_mut() else {
+            return false;
+        };
+        if self.schedule_version > 0 {
+            return false;
+        }
+        schedule.version = in_force + 1;
+        schedule.effect_tick = tick + 1;
+        self.schedule_version = schedule.version;
+        self.journal.add(&[u64::from(schedule.version), tick]);
+        true
     }
 
     /// Takes a request in: into the queue, unless it is there, was answered, or makes no sense.
@@ -279,6 +316,7 @@ impl Planner {
             tick: snapshot.header.tick,
             state_hash: self.state_hash(),
             constraints_version: self.table.version,
+            schedule_version: self.schedule_version,
             busy: u32::from(self.job.is_some() || !self.queue.is_empty() || outstanding),
             constraints_dropped: self.dropped,
             counters: self.counters,

@@ -34,14 +34,12 @@ impl Ahead {
         (self.count > 0).then(|| scene::vec(self.points[0]))
     }
 
-    /// The request for it.
-    pub(crate) fn request(&self, id: u32) -> PathRequest {
+    /// The request for it, not numbered yet.
+    pub(crate) fn request(&self) -> PathRequest {
         PathRequest {
-            id,
             count: self.count as u32,
-            actions: 0,
-            reserved: 0,
             points: self.points,
+            ..PathRequest::default()
         }
     }
 
@@ -134,7 +132,7 @@ mod tests {
         let path: Vec<_> = path.iter().map(|p| Vec2::new(p[0], p[1])).collect();
         let mut ahead = Ahead::NOWHERE;
         ahead.cut(&path, &lattice(), length_m);
-        let request = ahead.request(1);
+        let request = ahead.request();
         // Places on the lattice are sums of steps: compare them to a nanometre.
         let round = |x: f64| (x * 1e9).round() / 1e9;
         request

@@ -36,6 +36,12 @@ impl Intent {
         }
     }
 
+    /// Goes on from what the world has of an earlier process of this robot.
+    pub(crate) fn take_up(&mut self, now: &Now<'_>) {
+        self.sequence = now.me().acknowledged + 1;
+        self.asked = Asked::after(now.me());
+    }
+
     /// Asks for a way, if there is any motion in it.
     pub(crate) fn ask(&mut self, ahead: &Ahead) {
         if !ahead.stays() {

@@ -18,6 +18,7 @@ mod account;
 mod ahead;
 mod blocker;
 mod failure;
+mod follow;
 mod grasp;
 mod home;
 mod intent;

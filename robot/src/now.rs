@@ -5,7 +5,9 @@
 
 use planner::obstacles;
 use scene::{CONTACT_M, Scene, Vec2, vec};
-use shm_types::{Activity, Checked, ConstraintTable, HardAnswer, RobotState, WorldSnapshot, index};
+use shm_types::{
+    Activity, Checked, ConstraintTable, HardAnswer, RobotState, Schedule, WorldSnapshot, index,
+};
 
 use crate::look::Counted;
 
@@ -16,6 +18,8 @@ pub(crate) struct Now<'a> {
     pub(crate) snapshot: Checked<'a, WorldSnapshot>,
     /// The hard constraints at hand.
     pub(crate) table: Checked<'a, ConstraintTable>,
+    /// The schedule in force, if it is at hand.
+    pub(crate) schedule: Option<&'a Schedule>,
     /// The planner's newest answer to this robot.
     pub(crate) answer: Option<HardAnswer>,
     /// This robot's id.

@@ -57,7 +57,15 @@ impl Asked {
 
     /// Asks for a path, first in the command of number `sequence`.
     pub(crate) fn ask(&mut self, ahead: &Ahead, sequence: u64) {
-        self.request = ahead.request(self.request.id + 1);
+        self.ask_for(ahead.request(), sequence);
+    }
+
+    /// Asks for this path under a new number, first in the command of number `sequence`.
+    pub(crate) fn ask_for(&mut self, request: PathRequest, sequence: u64) {
+        self.request = PathRequest {
+            id: self.request.id + 1,
+            ..request
+        };
         self.sequence = sequence;
     }
 
@@ -87,6 +95,7 @@ impl Asked {
     pub(crate) fn hash_into(&self, hash: &mut StateHash) {
         hash.add(&self.sequence);
         hash.add(&[self.request.id, self.request.count]);
+        hash.add(&[self.request.actions, self.request.schedule_version]);
         hash.add(self.request.points());
     }
 }

@@ -5,14 +5,15 @@
 
 use scene::{Budget, Scene, Settings};
 use shm_types::{
-    Checked, Command, ConstraintTable, HardAnswer, HardRequest, StateHash, WorldSnapshot,
+    Checked, Command, ConstraintTable, Counters, HardAnswer, HardRequest, Phase as WirePhase,
+    Schedule, StateHash, WorldSnapshot,
 };
 
 use crate::account::{Doing, Thinking};
+use crate::follow::Follower;
 use crate::intent::Intent;
 use crate::now::Now;
 use crate::phase::{Next, Phase};
-use crate::request::Asked;
 use crate::select::{self, Selecting};
 use crate::{home, release, transfer, transit};
 
@@ -24,6 +25,9 @@ pub struct RobotInput<'a> {
     /// The table of version `epoch_constraints_version` of that snapshot; for 0 an empty one.
     /// With any other version the robot waits before it selects.
     pub table: Checked<'a, ConstraintTable>,
+    /// The schedule of version `schedule_version` of that snapshot, if there is one and it is at
+    /// hand.
+    pub schedule: Option<Checked<'a, Schedule>>,
     /// The planner's newest answer to this robot.
     pub answer: Option<HardAnswer>,
 }
@@ -32,10 +36,24 @@ pub struct RobotInput<'a> {
 pub struct Robot {
     id: usize,
     incarnation: u32,
-    phase: Phase,
+    command_valid_ticks: u64,
+    mind: Mind,
     intent: Intent,
-    thinking: Thinking,
     hash: StateHash,
+}
+
+/// What decides.
+enum Mind {
+    /// It selects tasks, and plans for itself.
+    Selects(Box<Selector>),
+    /// It follows the planner service's schedule.
+    Follows(Follower),
+}
+
+/// A robot that selects.
+struct Selector {
+    phase: Phase,
+    thinking: Thinking,
 }
 
 impl Robot {
@@ -46,9 +64,16 @@ impl Robot {
         Self {
             id,
             incarnation,
-            phase: Phase::Starting,
+            command_valid_ticks: settings.command_valid_ticks,
+            mind: if settings.method.plans_ahead() {
+                Mind::Follows(Follower::new(&settings))
+            } else {
+                Mind::Selects(Box::new(Selector {
+                    phase: Phase::Starting,
+                    thinking: Thinking::new(scene, settings),
+                }))
+            },
             intent: Intent::new(),
-            thinking: Thinking::new(scene, settings),
             hash: StateHash::new(),
         }
     }
@@ -66,18 +91,83 @@ impl Robot {
             scene,
             snapshot: input.snapshot,
             table: input.table,
+            schedule: input.schedule.map(Checked::get),
             answer: input.answer,
             id: self.id,
             incarnation: self.incarnation,
         };
-        self.thinking.budget = Budget::new(units);
         self.intent.hard_request = None;
         self.intent.sequence += 1;
-        if now.epoch() != self.intent.selected_epoch {
+        let (phase, doing) = match &mut self.mind {
+            Mind::Selects(selector) => selector.act(&now, units, &mut self.intent),
+            Mind::Follows(follower) => follower.act(&now, &mut self.intent),
+        };
+        self.write(&now, phase, doing, out);
+        self.intent.hard_request
+    }
+
+    /// A cycle among the tasks that the newest selection found, each before the next and the last
+    /// before the first; empty if there was none (rule 15).
+    #[must_use]
+    pub fn cycle(&self) -> &[usize] {
+        match &self.mind {
+            Mind::Selects(selector) => selector.thinking.selection.cycle(),
+            Mind::Follows(_) => &[],
+        }
+    }
+
+    fn write(&mut self, now: &Now<'_>, phase: WirePhase, doing: Doing, out: &mut Command) {
+        let tick = now.snapshot.header.tick;
+        *out = Command {
+            robot: self.id as u32,
+            incarnation: self.incarnation,
+            sequence: self.intent.sequence,
+            tick,
+            valid_until_tick: tick + self.command_valid_ticks,
+            settled_at_change: doing.settled_at_change,
+            state_hash: self.state_hash(),
+            phase: phase.code(),
+            activity: doing.activity.code(),
+            go: u32::from(doing.go),
+            grip: doing.grip.code(),
+            claim: self.intent.claim,
+            failure: self.intent.failure,
+            path: *self.intent.asked.request(),
+            counters: match &self.mind {
+                Mind::Selects(selector) => selector.thinking.counters,
+                Mind::Follows(_) => Counters::default(),
+            },
+        };
+    }
+
+    /// Hash of the private state: what the next step depends on beside its inputs.
+    fn state_hash(&mut self) -> u64 {
+        let hash = &mut self.hash;
+        hash.reset();
+        match &self.mind {
+            Mind::Selects(selector) => {
+                selector.phase.hash_into(hash);
+                self.intent.hash_into(hash);
+                selector.thinking.hash_into(hash);
+            }
+            Mind::Follows(follower) => {
+                self.intent.hash_into(hash);
+                follower.hash_into(hash);
+            }
+        }
+        hash.finish()
+    }
+}
+
+impl Selector {
+    /// Goes from phase to phase until this tick's work is done or spent.
+    fn act(&mut self, now: &Now<'_>, units: u64, intent: &mut Intent) -> (WirePhase, Doing) {
+        self.thinking.budget = Budget::new(units);
+        if now.epoch() != intent.selected_epoch {
             self.phase = self.phase.reselect(now.is_gripping());
         }
         let doing = loop {
-            match self.act(&now) {
+            match self.next(now, intent) {
                 Next::Enter(phase) => self.phase = phase,
                 Next::Rest(phase, doing) => {
                     self.phase = phase;
@@ -86,20 +176,12 @@ impl Robot {
             }
         };
         self.thinking.counters.units += self.thinking.budget.spent();
-        self.write(&now, doing, out);
-        self.intent.hard_request
-    }
-
-    /// A cycle among the tasks that the newest selection found, each before the next and the last
-    /// before the first; empty if there was none (rule 15).
-    #[must_use]
-    pub fn cycle(&self) -> &[usize] {
-        self.thinking.selection.cycle()
+        (self.phase.wire(), doing)
     }
 
     /// What the present phase leads to.
-    fn act(&mut self, now: &Now<'_>) -> Next {
-        let (thinking, intent) = (&mut self.thinking, &mut self.intent);
+    fn next(&mut self, now: &Now<'_>, intent: &mut Intent) -> Next {
+        let thinking = &mut self.thinking;
         match self.phase {
             Phase::Starting => Next::Enter(take_up(now, intent)),
             Phase::Selecting(selecting) => selecting.act(now, thinking, intent),
@@ -112,43 +194,12 @@ impl Robot {
             Phase::GoingHome(trip) => home::act(trip, now, thinking, intent),
         }
     }
-
-    fn write(&mut self, now: &Now<'_>, doing: Doing, out: &mut Command) {
-        let tick = now.snapshot.header.tick;
-        *out = Command {
-            robot: self.id as u32,
-            incarnation: self.incarnation,
-            sequence: self.intent.sequence,
-            tick,
-            valid_until_tick: tick + self.thinking.settings.command_valid_ticks,
-            settled_at_change: doing.settled_at_change,
-            state_hash: self.state_hash(),
-            phase: self.phase.wire().code(),
-            activity: doing.activity.code(),
-            go: u32::from(doing.go),
-            grip: doing.grip.code(),
-            claim: self.intent.claim,
-            failure: self.intent.failure,
-            path: *self.intent.asked.request(),
-            counters: self.thinking.counters,
-        };
-    }
-
-    /// Hash of the private state: what the next step depends on beside its inputs.
-    fn state_hash(&mut self) -> u64 {
-        self.hash.reset();
-        self.phase.hash_into(&mut self.hash);
-        self.intent.hash_into(&mut self.hash);
-        self.thinking.hash_into(&mut self.hash);
-        self.hash.finish()
-    }
 }
 
 /// What a robot that has just been started finds itself doing. Also numbers go on from what the
 /// world has of an earlier process of this robot.
 fn take_up(now: &Now<'_>, intent: &mut Intent) -> Phase {
-    intent.sequence = now.me().acknowledged + 1;
-    intent.asked = Asked::after(now.me());
+    intent.take_up(now);
     match now.holding() {
         Some(task) => {
             intent.claim = select::claim(now, Some(task));

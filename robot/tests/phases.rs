@@ -101,6 +101,7 @@ impl Bench {
         let input = RobotInput {
             snapshot: Checked::new(&*self.snapshot, counts).unwrap(),
             table: Checked::new(&*self.table, counts).unwrap(),
+            schedule: None,
             answer: self.answer,
         };
         let asked = self

@@ -28,6 +28,10 @@ pub type Vec2 = nalgebra::Vector2<f64>;
 /// touching (rule 1).
 pub const CONTACT_M: f64 = 1e-6;
 
+/// Nearer than this to a corner point of a path (m), a robot is at it: rounding of lengths must
+/// not cost a tick. A thousandth of what divides touching from overlap.
+pub const ARRIVAL_M: f64 = CONTACT_M / 1_000.0;
+
 /// A wire point as a vector.
 #[must_use]
 pub const fn vec(point: Point) -> Vec2 {

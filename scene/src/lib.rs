@@ -44,7 +44,9 @@ pub use canonical::to_canonical_toml;
 pub use cspace::Occupancy;
 pub use draft::{Draft, Event, Move, ObjectDraft, RobotDraft, ShapeDraft, UserOrder, WallDraft};
 pub use generate::{GenerateError, GenerateOptions, Generated, generate, scatter};
-pub use geometry::{CONTACT_M, Vec2, overlap, point, swept_overlap, swept_regions_overlap, vec};
+pub use geometry::{
+    ARRIVAL_M, CONTACT_M, Vec2, overlap, point, swept_overlap, swept_regions_overlap, vec,
+};
 pub use lattice::{Connectivity, Lattice};
 pub use moves::{CertificateError, MovePart, check_certificate};
 pub use pieces::{PieceWork, Pieces};

@@ -112,6 +112,13 @@ impl<'a, T: Validate> Checked<'a, T> {
 }
 
 impl<'a, T> Checked<'a, T> {
+    /// A message that was checked against the same counts before and has not changed since: a
+    /// sample in shared memory never does. For messages too long to be checked at every tick.
+    #[must_use]
+    pub const fn as_before(message: &'a T) -> Self {
+        Self(message)
+    }
+
     /// The message, for as long as the sample it lies in.
     #[must_use]
     pub const fn get(self) -> &'a T {

@@ -30,8 +30,9 @@ pub struct PathRequest {
     /// Actions of the robot's schedule that are granted to it once all of this is: each point but
     /// the first ends one. Always 0 where no schedule is followed.
     pub actions: u32,
-    /// Always 0.
-    pub reserved: u32,
+    /// Version of the schedule that these actions are of; 0 where none is followed. A request
+    /// of another version than the one in force is not taken.
+    pub schedule_version: u32,
     /// Corner points; unused ones are zero.
     pub points: [Point; MAX_PATH_POINTS],
 }

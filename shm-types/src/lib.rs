@@ -25,6 +25,7 @@ mod planner;
 mod point;
 mod schedule;
 mod snapshot;
+mod versioned;
 
 pub use checked::{Checked, Counts, Invalid, Validate};
 pub use command::{Claim, Command, Counters, Failure, PathRequest};
@@ -41,6 +42,7 @@ pub use snapshot::{
     Activity, FailureCause, Grip, ObjectState, Outcome, Phase, RobotState, SnapshotHeader,
     TaskStatus, WorldSnapshot,
 };
+pub use versioned::Versioned;
 
 /// Allocates a message on the heap, all zero, without building it on the stack first.
 ///

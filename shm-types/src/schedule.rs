@@ -48,7 +48,10 @@ pub struct Wait {
 #[repr(C)]
 pub struct RobotSchedule {
     /// Number of its first action listed here. Those before are past, or as an earlier version
-    /// had them and granted.
+    /// had them and granted. When the schedule comes into force, all that is granted must have
+    /// been listed, and what is listed of it must lead where it was granted to; an action
+    /// granted in part must be listed as it was. List the last one granted as long as its grip
+    /// is not done: a process of the robot that is started then knows of it.
     pub first: u32,
     /// How many actions are listed.
     pub count: u32,

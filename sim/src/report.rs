@@ -5,7 +5,7 @@
 
 use std::fmt;
 
-use shm_types::{Counters, Outcome};
+use shm_types::{Counters, Outcome, Verdict};
 use world::{ActivityTimes, WorldCounters};
 
 /// One robot's account.
@@ -22,6 +22,8 @@ pub struct RobotReport {
 pub struct SimReport {
     /// How it ended.
     pub outcome: Outcome,
+    /// What the planner said of the run's end.
+    pub verdict: Verdict,
     /// Why, where the outcome alone does not say.
     pub reason: Option<String>,
     /// Ticks made.

@@ -10,8 +10,9 @@ use robot::{Robot, RobotInput};
 use scene::{Scene, Settings};
 use shm_types::capacity::MAX_ROBOTS;
 use shm_types::{
-    Checked, Command, ControlKind, ControlRequest, Counts, HardAnswer, HardRequest, Invalid,
-    MotionBatch, Outcome, PlannerReport, RoleKind, Validate, WorldSnapshot, zeroed,
+    Checked, Command, ConstraintTable, ControlKind, ControlRequest, Counts, HardAnswer,
+    HardRequest, Invalid, MotionBatch, Outcome, PlannerReport, RoleKind, Schedule, Validate,
+    WorldSnapshot, zeroed,
 };
 use world::{FIRST_INCARNATION, World, WorldInput};
 
@@ -75,8 +76,12 @@ pub struct Simulation<'s> {
     staged: Vec<HardRequest>,
     /// The planner's newest answer to each robot, as of the tick before.
     answers: Vec<Option<HardAnswer>>,
-    /// What the planner has published.
-    tables: Tables,
+    /// Constraint tables that the planner has published.
+    tables: Tables<ConstraintTable>,
+    /// The table of version 0.
+    empty: Box<ConstraintTable>,
+    /// Schedules that it has published.
+    schedules: Tables<Schedule>,
     /// What the world is told in the next step.
     control: Vec<ControlRequest>,
     control_id: u64,
@@ -108,10 +113,18 @@ impl<'s> Simulation<'s> {
             staged: Vec::with_capacity(robots),
             answers: vec![None; robots],
             tables: Tables::new(),
+            empty: ConstraintTable::none(),
+            schedules: Tables::new(),
             control: Vec::with_capacity(robots + 1),
             control_id: 0,
             settings: settings.clone(),
         }
+    }
+
+    /// Puts another planner in the place of the one there is: one whose plan is made already.
+    #[must_use]
+    pub fn with_planner(self, planner: Planner) -> Self {
+        Self { planner, ..self }
     }
 
     /// The newest snapshot.
@@ -199,14 +212,19 @@ impl<'s> Simulation<'s> {
     fn step_robots(&mut self, units: u64, probe: &mut impl Probe) {
         let counts = self.scene.counts();
         let snapshot = checked(&*self.snapshot, counts);
-        let version = snapshot.header.epoch_constraints_version;
-        let table = checked(self.tables.version(version), counts);
+        // The empty one if it is not kept: who wants another sees that, and waits.
+        let table = self
+            .tables
+            .version(snapshot.header.epoch_constraints_version)
+            .unwrap_or_else(|| checked(&*self.empty, counts));
+        let schedule = self.schedules.version(snapshot.header.schedule_version);
         self.asked.clear();
         for (id, robot) in self.robots.iter_mut().enumerate() {
             probe.enter(Participant::Robot(id));
             let input = RobotInput {
                 snapshot,
                 table,
+                schedule,
                 answer: self.answers[id],
             };
             let asked = robot.step(self.scene, input, units, &mut self.commands[id]);
@@ -215,8 +233,9 @@ impl<'s> Simulation<'s> {
     }
 
     fn step_planner(&mut self, units: u64) {
+        let counts = self.scene.counts();
         let input = PlannerInput {
-            snapshot: checked(&*self.snapshot, self.scene.counts()),
+            snapshot: checked(&*self.snapshot, counts),
             requests: &self.staged,
         };
         let output = self.planner.step(self.scene, input, units);
@@ -227,8 +246,15 @@ impl<'s> Simulation<'s> {
         for answer in output.answers {
             self.answers[answer.robot as usize] = Some(*answer);
         }
+        let header = &self.snapshot.header;
         if let Some(table) = output.table {
-            self.tables.publish(table);
+            let in_force = header.epoch_constraints_version;
+            self.tables
+                .publish(checked(table, counts).get(), counts, in_force);
+        }
+        if let Some(schedule) = output.schedule {
+            self.schedules
+                .publish(schedule, counts, header.schedule_version);
         }
         std::mem::swap(&mut self.asked, &mut self.staged);
     }
@@ -242,7 +268,8 @@ impl<'s> Simulation<'s> {
         let input = WorldInput {
             commands: &commands[..self.commands.len()],
             planner: Some(checked(&self.report, counts)),
-            table: self.tables.newest().map(|table| checked(table, counts)),
+            table: self.tables.newest().and_then(|(_, table)| table),
+            schedule: self.schedules.newest(),
             control: &self.control,
         };
         self.world.step(self.scene, input, &mut self.motion);
@@ -263,6 +290,7 @@ impl<'s> Simulation<'s> {
             });
         SimReport {
             outcome: self.outcome(),
+            verdict: self.world.verdict(),
             reason: self.reason(),
             ticks: self.snapshot.header.tick,
             time_ns: self.snapshot.header.time_ns,

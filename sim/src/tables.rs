@@ -1,53 +1,61 @@
-//! Constraint tables on their way from the planner to those who read them.
+//! What the planner publishes in versions, on its way to those who read it: constraint tables,
+//! schedules.
 //!
 //! Responsible for: keeping the versions that a snapshot may still name.
 //! Not responsible for: which version is in force (the world).
 
-use shm_types::{ConstraintTable, zeroed};
+use shm_types::{Checked, Counts, Versioned, zeroed};
 
-/// Versions kept. An epoch opens with every version that comes into force, so that a snapshot
-/// names one of the newest two; the rest is for versions that are published faster than the world
-/// can bring them into force.
+/// Versions kept. A snapshot names one of the newest two; the rest is for versions that are
+/// published faster than the world can bring them into force.
 const KEPT: usize = 4;
 
-/// The newest tables.
-pub(crate) struct Tables {
-    /// Version 0.
-    empty: Box<ConstraintTable>,
-    kept: [Box<ConstraintTable>; KEPT],
+/// The newest of all that was published.
+pub(crate) struct Tables<T> {
+    kept: [Box<T>; KEPT],
+    /// Whether each is a legal message.
+    legal: [bool; KEPT],
     /// Where the newest is; `None` before the first.
     newest: Option<usize>,
 }
 
-impl Tables {
+impl<T: Versioned> Tables<T> {
     /// Nothing published yet.
     pub(crate) fn new() -> Self {
         Self {
-            empty: ConstraintTable::none(),
             kept: std::array::from_fn(|_| zeroed()),
+            legal: [false; KEPT],
             newest: None,
         }
     }
 
-    /// Takes a new version.
-    pub(crate) fn publish(&mut self, table: &ConstraintTable) {
-        let place = self.newest.map_or(0, |newest| (newest + 1) % KEPT);
-        self.kept[place].copy_from(table);
+    /// Takes a new version. It takes the place of the oldest, but not of the one in force.
+    pub(crate) fn publish(&mut self, message: &T, counts: Counts, in_force: u32) {
+        let next = |place: usize| (place + 1) % KEPT;
+        let mut place = self.newest.map_or(0, next);
+        if in_force > 0 && self.kept[place].version() == in_force {
+            place = next(place);
+        }
+        self.kept[place].copy_from(message);
+        self.legal[place] = message.validate(counts).is_ok();
         self.newest = Some(place);
     }
 
-    /// The newest table; `None` before the first.
-    pub(crate) fn newest(&self) -> Option<&ConstraintTable> {
-        self.newest.map(|newest| &*self.kept[newest])
+    /// The newest: its version, and the message unless it is no legal one. `None` before the
+    /// first.
+    pub(crate) fn newest(&self) -> Option<(u32, Option<Checked<'_, T>>)> {
+        let place = self.newest?;
+        Some((self.kept[place].version(), self.checked(place)))
     }
 
-    /// The table of this version. The empty one if it is not kept: its reader sees that it is not
-    /// the one it wants, and waits.
-    pub(crate) fn version(&self, version: u32) -> &ConstraintTable {
-        let kept = self
-            .kept
-            .iter()
-            .find(|table| version > 0 && table.version == version);
-        kept.unwrap_or(&self.empty)
+    /// The message of this version, if it is kept.
+    pub(crate) fn version(&self, version: u32) -> Option<Checked<'_, T>> {
+        let mut kept = self.kept.iter();
+        let place = kept.position(|kept| version > 0 && kept.version() == version)?;
+        self.checked(place)
+    }
+
+    fn checked(&self, place: usize) -> Option<Checked<'_, T>> {
+        self.legal[place].then(|| Checked::as_before(&*self.kept[place]))
     }
 }

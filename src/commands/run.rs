@@ -7,7 +7,7 @@
 use node::RunOptions;
 use planner::{BoundLimits, Bounds};
 use scene::{Infeasible, Scene};
-use shm_types::Outcome as RunOutcome;
+use shm_types::{Outcome as RunOutcome, Verdict};
 use trace::CheckReport;
 
 use crate::drivers::{Finished, in_process, processes};
@@ -169,6 +169,8 @@ fn counts(finished: &Finished) -> Counts {
         task_failures: world.task_failures,
         selection_conflicts: world.selection_conflicts,
         grants_refused: world.grants_refused,
+        invalid_requests: world.invalid_requests,
+        schedules_refused: world.schedules_refused,
         deadline_misses: finished.deadline_misses,
         restarts: finished.restarts,
         lost_commands: finished.lost_commands,
@@ -205,6 +207,9 @@ fn ending(finished: &Finished, checker: Option<&Checker>) -> (Ending, Option<Str
             (Ending::Failed, Some(reason))
         }
         RunOutcome::Solved => (Ending::Solved, reason),
+        RunOutcome::Stuck if finished.world.verdict == Verdict::Exhausted.code() => {
+            (Ending::Infeasible, reason)
+        }
         RunOutcome::Stuck => (Ending::Stuck, reason),
         RunOutcome::Timeout => (Ending::Timeout, reason),
         RunOutcome::Interrupted => (Ending::Interrupted, reason),

@@ -172,6 +172,7 @@ fn finished(report: SimReport) -> Finished {
         reason: report.reason,
         world: WorldReport {
             outcome: report.outcome.code(),
+            verdict: report.verdict.code(),
             reason: None,
             ticks: report.ticks,
             time_ns: report.time_ns,
@@ -179,6 +180,8 @@ fn finished(report: SimReport) -> Finished {
             hard_constraints: report.world.constraints_found,
             task_failures: report.world.task_failures,
             grants_refused: report.world.grants_refused,
+            invalid_requests: report.world.invalid_requests,
+            schedules_refused: report.world.schedules_refused,
             selection_conflicts: report.world.selection_conflicts,
             violations: report.world.violations,
             swept_tests: report.world.swept_tests,

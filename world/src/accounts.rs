@@ -55,6 +55,8 @@ pub struct WorldCounters {
     pub grips_refused: u64,
     /// Invariants found broken.
     pub violations: u64,
+    /// Schedules that were no legal messages or did not go on from what was granted.
+    pub schedules_refused: u64,
     /// Exact swept tests of two shapes.
     pub swept_tests: u64,
 }
@@ -81,11 +83,13 @@ pub(crate) fn activity_of(robot: &Robot, fresh: bool, held: bool) -> Activity {
 }
 
 /// Enters every robot's tick and returns how many participants were computing: what one shared
-/// computer is divided by. Waiting for the planner's answer is computing to the robot's account
-/// but takes none of the computer's time.
+/// computer is divided by. Waiting for the planner, for its answer or, where robots never compute
+/// themselves, for its schedule, is computing to the robot's account but takes none of the
+/// computer's time.
 pub(crate) fn settle(
     robots: &mut [Robot],
     planner: Option<&PlannerReport>,
+    robots_compute: bool,
     tick: u64,
     held: bool,
 ) -> u32 {
@@ -93,7 +97,8 @@ pub(crate) fn settle(
     for robot in robots {
         robot.activity = activity_of(robot, robot.link.is_fresh(tick), held);
         robot.times.add(robot.activity);
-        if robot.activity == Activity::Computing && robot.link.phase != Phase::Failing {
+        let computes = robots_compute && robot.link.phase != Phase::Failing;
+        if computes && robot.activity == Activity::Computing {
             busy += 1;
         }
     }

@@ -8,6 +8,9 @@
 //! (a *conflict*: it never happens while all robots select alike). It displaces a claim that is
 //! left over from an earlier epoch, since ungrasped tasks return to the pool (rule 18). A claim
 //! one epoch *late* is good if nobody has the task and no known constraint forbids it.
+//!
+//! Where robots follow a schedule, claims say only which object is about to be grasped: one on an
+//! object that needs no transport is good too, and one refused is judged again at every tick.
 
 use shm_types::{Claim, ConstraintTable, EventKind, TaskStatus, index};
 
@@ -53,20 +56,20 @@ impl World {
             }
             return;
         }
-        if self.robots[i].refused_claim == Some(wanted) {
+        let repeated = self.robots[i].refused_claim == Some(wanted);
+        if repeated && !self.settings.method.plans_ahead() {
             return;
         }
         self.unclaim(i, journal);
-        match self.judge(i, wanted, claim.constraints_version, known) {
-            Verdict::Good => self.claim(i, wanted, journal),
-            Verdict::Conflict => {
-                self.counters.selection_conflicts += 1;
-                self.robots[i].refused_claim = Some(wanted);
-            }
-            Verdict::Invalid => {
-                self.counters.invalid_claims += 1;
-                self.robots[i].refused_claim = Some(wanted);
-            }
+        let verdict = self.judge(i, wanted, claim.constraints_version, known);
+        if verdict == Verdict::Good {
+            self.claim(i, wanted, journal);
+            return;
+        }
+        self.robots[i].refused_claim = Some(wanted);
+        if !repeated {
+            self.counters.selection_conflicts += u64::from(verdict == Verdict::Conflict);
+            self.counters.invalid_claims += u64::from(verdict == Verdict::Invalid);
         }
     }
 
@@ -78,6 +81,9 @@ impl World {
         known: Option<&ConstraintTable>,
     ) -> Verdict {
         let object = &self.objects[wanted.task];
+        // Who plans ahead may have to move what is where it belongs, for others' sake.
+        let free = object.status == TaskStatus::Waiting
+            || object.status == TaskStatus::Done && self.settings.method.plans_ahead();
         if object.is_barred(i) || self.robots[i].leaving.is_full() {
             return Verdict::Invalid;
         }
@@ -86,13 +92,12 @@ impl World {
                 return Verdict::Invalid;
             }
             return match (object.status, object.claimed_by) {
-                (TaskStatus::Waiting, _) => Verdict::Good,
+                _ if free => Verdict::Good,
                 (TaskStatus::Claimed, Some(j)) => self.judge_against(j),
                 _ => Verdict::Invalid,
             };
         }
         let late = wanted.epoch + 1 == self.epoch.number;
-        let free = object.status == TaskStatus::Waiting;
         let known = known.unwrap_or(&self.constraints.in_force);
         if late && free && !self.is_forbidden(wanted.task, known) {
             Verdict::Good
@@ -141,8 +146,9 @@ impl World {
         let Some(Claimed { task, .. }) = self.robots[i].claim.take() else {
             return;
         };
-        self.objects[task].status = TaskStatus::Waiting;
-        self.objects[task].claimed_by = None;
+        let object = &mut self.objects[task];
+        object.status = object.status_on_ground();
+        object.claimed_by = None;
         self.robots[i].leaving.add(task);
         journal.event(Event::new(EventKind::Unclaimed).robot(i).task(task));
     }

@@ -7,7 +7,7 @@ use scene::Scene;
 use shm_types::{Activity, Checked, Command, ConstraintTable, Grip, Phase};
 
 use crate::journal::Journal;
-use crate::requests;
+use crate::requests::{self, InForce};
 use crate::step::{World, WorldInput};
 
 impl World {
@@ -55,8 +55,12 @@ impl World {
     }
 
     fn take_request(&mut self, scene: &Scene, i: usize, command: &Command) {
+        let in_force = InForce {
+            tick: self.tick,
+            schedule_version: self.schedules.in_force,
+        };
         let robot = &mut self.robots[i];
-        let sound = requests::take(scene, &self.bodies, robot, &command.path, self.tick);
+        let sound = requests::take(scene, &self.bodies, robot, &command.path, in_force);
         self.counters.invalid_requests += u64::from(!sound);
     }
 }

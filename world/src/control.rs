@@ -68,7 +68,11 @@ impl World {
         if link.live && link.incarnation == incarnation {
             return;
         }
-        self.park(i, journal);
+        if link.live && self.settings.method.plans_ahead() {
+            self.hand_over(i);
+        } else {
+            self.park(i, journal);
+        }
         let robot = &mut self.robots[i];
         robot.link = Link::new(incarnation);
         robot.request = 0;
@@ -89,12 +93,18 @@ impl World {
         journal.event(Event::new(EventKind::RobotDown).robot(i));
     }
 
+    /// Leaves what robot `i` has to its next process. Others may have passed where they wait for
+    /// what is granted to it: that stays granted, and will be driven.
+    fn hand_over(&mut self, i: usize) {
+        self.abort_grip(i);
+        self.robots[i].keep_whole_actions();
+    }
+
     /// Leaves robot `i` standing: no path, no grip in motion, no task but that of what it holds.
     fn park(&mut self, i: usize, journal: &mut Journal<'_>) {
         self.abort_grip(i);
         let robot = &mut self.robots[i];
-        robot.grant.clear();
-        robot.drop_rest();
+        robot.give_up_path();
         robot.failure = None;
         if robot.hand == Hand::Empty {
             self.unclaim(i, journal);

@@ -202,6 +202,7 @@ impl Grants {
         robot.cut = !whole;
         if whole {
             robot.rest.drop_front(1);
+            robot.action_end = Some(end);
         }
     }
 

@@ -108,8 +108,7 @@ impl World {
         let robot = &mut self.robots[i];
         robot.hand = hand;
         robot.gripped = true;
-        robot.grant.clear();
-        robot.drop_rest();
+        robot.give_up_path();
     }
 
     const fn ticks_of(&self, duration_ns: u64) -> u64 {

@@ -14,7 +14,7 @@
 //!
 //! One step, in this order: control, commands, constraint version, failures, grips that begin,
 //! grants in space, grants in time, motion, grips that end, bars and epoch, invariants, accounts,
-//! outcome, hash. One file each.
+//! schedule version, outcome, hash. One file each.
 #![forbid(unsafe_code)]
 
 mod accounts;
@@ -36,6 +36,7 @@ mod path;
 #[cfg(test)]
 mod random;
 mod requests;
+mod schedules;
 mod settled;
 mod state;
 mod step;
@@ -48,4 +49,5 @@ mod wire;
 pub use accounts::{ActivityTimes, WorldCounters};
 pub use control::FIRST_INCARNATION;
 pub use invariants::Violation;
+pub use schedules::PublishedSchedule;
 pub use step::{World, WorldInput};

@@ -6,9 +6,7 @@
 use scene::Vec2;
 use shm_types::capacity::MAX_PATH_POINTS;
 
-/// Nearer than this to a corner point (m), a robot is at it: rounding of lengths must not cost a
-/// tick. A thousandth of what divides touching from overlap.
-pub(crate) const ARRIVAL_M: f64 = scene::CONTACT_M / 1_000.0;
+pub(crate) use scene::ARRIVAL_M;
 
 /// Corner points still ahead, nearest first. The start is not among them.
 #[derive(Clone, Copy, Debug)]
@@ -60,6 +58,11 @@ impl Path {
         if self.count > 0 {
             self.points[self.count - 1] = point;
         }
+    }
+
+    /// Drops the last point, if there is one.
+    pub(crate) const fn drop_last(&mut self) {
+        self.count = self.count.saturating_sub(1);
     }
 
     /// Drops the nearest `count` points.

@@ -1,7 +1,8 @@
 //! Path requests: what a robot asks for, checked before it waits in the queue.
 //!
 //! Responsible for: that a request starts where the standing grant ends, stays in the room and
-//! crosses no wall. Not responsible for: objects and other robots, which come and go
+//! crosses no wall; where a schedule is followed, that each of its points ends an action of the
+//! one in force. Not responsible for: objects and other robots, which come and go
 //! (`grants.rs`).
 
 use scene::{Scene, Vec2};
@@ -11,6 +12,15 @@ use crate::bodies::{Bodies, Sweep};
 use crate::path::{ARRIVAL_M, Path};
 use crate::state::{Robot, is_at};
 
+/// What a request is held against.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct InForce {
+    /// The present tick.
+    pub(crate) tick: u64,
+    /// Version of the schedule; 0 for none.
+    pub(crate) schedule_version: u32,
+}
+
 /// Takes `request` if it is newer than the last one: what was asked for before and not granted is
 /// dropped, whatever comes of the new one. False if it is no sound request.
 pub(crate) fn take(
@@ -18,15 +28,19 @@ pub(crate) fn take(
     bodies: &Bodies,
     robot: &mut Robot,
     request: &PathRequest,
-    tick: u64,
+    in_force: InForce,
 ) -> bool {
     if request.id <= robot.request || robot.hand.is_moving() {
         return true;
     }
     robot.request = request.id;
-    robot.request_tick = tick;
+    robot.request_tick = in_force.tick;
     robot.refused = false;
     robot.drop_rest();
+    if request.schedule_version != in_force.schedule_version {
+        // Late: what it asks for may have changed.
+        return true;
+    }
     let Some((first, ahead)) = request.points().split_first() else {
         return true;
     };
@@ -35,7 +49,11 @@ pub(crate) fn take(
         return false;
     }
     let path = corners(start, ahead.iter().copied().map(scene::vec));
-    let sound = stays_inside(scene, &path) && crosses_no_wall(scene, bodies, robot, &path);
+    let ends_actions = in_force.schedule_version == 0
+        || path.points().len() == ahead.len()
+            && request.actions as usize == robot.actions as usize + ahead.len().max(1);
+    let sound =
+        ends_actions && stays_inside(scene, &path) && crosses_no_wall(scene, bodies, robot, &path);
     if sound {
         robot.rest = path;
         robot.actions = request.actions;

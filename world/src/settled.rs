@@ -10,7 +10,7 @@
 use std::fmt;
 
 use scene::Scene;
-use shm_types::{Outcome, PlannerReport, TaskStatus};
+use shm_types::{Outcome, PlannerReport, TaskStatus, Verdict};
 
 use crate::state::is_at;
 use crate::step::World;
@@ -99,7 +99,18 @@ impl World {
     pub fn reason(&self, scene: &Scene) -> Option<String> {
         let violation = || self.violation().map(|found| format!("{found:?}"));
         let overflow = || self.overflow.map(|found| found.to_string());
-        let stuck = || self.stuck_reason(scene).map(|stuck| stuck.to_string());
+        let stuck = || {
+            let stuck = self.stuck_reason(scene)?;
+            Some(match self.verdict {
+                Verdict::Open => stuck.to_string(),
+                Verdict::NotFound => {
+                    format!("the planner found no plan within its limits; {stuck}")
+                }
+                Verdict::Exhausted => "no plan exists on this lattice: every arrangement that can \
+                                       be reached was looked at"
+                    .to_owned(),
+            })
+        };
         violation().or_else(overflow).or_else(stuck)
     }
 
@@ -144,7 +155,11 @@ impl World {
         let looked = |settled_at: u64| settled_at == self.epoch.change;
         let mut live = self.robots.iter().filter(|r| r.link.live).peekable();
         let in_force = self.constraints.in_force.version;
-        let idle = planner.is_none_or(|p| p.busy == 0 && p.constraints_version <= in_force);
+        let idle = planner.is_none_or(|p| {
+            p.busy == 0
+                && p.constraints_version <= in_force
+                && p.schedule_version <= self.schedules.judged
+        });
         idle && !self.held
             && live.peek().is_some()
             && live.all(|r| {

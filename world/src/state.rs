@@ -165,6 +165,8 @@ pub(crate) struct Robot {
     pub(crate) request_tick: u64,
     /// Actions of its schedule that are granted once all that is asked for is.
     pub(crate) actions: u32,
+    /// Where the last action granted ends; `None` if the robot gave up path before it got there.
+    pub(crate) action_end: Option<Vec2>,
     /// Whether that request has been counted as refused.
     pub(crate) refused: bool,
     pub(crate) failure: Option<PendingFailure>,
@@ -199,6 +201,7 @@ impl Robot {
             request: 0,
             request_tick: 0,
             actions: 0,
+            action_end: Some(home),
             refused: false,
             failure: None,
             last_failure: 0,
@@ -235,6 +238,27 @@ impl Robot {
         self.actions.saturating_sub(self.rest.points().len() as u32)
     }
 
+    /// Gives up all path, granted or asked for, and stays where it is. Actions it has not got to
+    /// the end of are no longer granted.
+    pub(crate) fn give_up_path(&mut self) {
+        let part = usize::from(self.cut);
+        let whole = self.grant.points().len().saturating_sub(part);
+        self.drop_rest();
+        self.grant.clear();
+        if whole > 0 {
+            self.actions = self.actions.saturating_sub(id(whole));
+            self.action_end = None;
+        }
+    }
+
+    /// Keeps the path granted as far as it ends actions, and drops all else.
+    pub(crate) fn keep_whole_actions(&mut self) {
+        if self.cut {
+            self.grant.drop_last();
+        }
+        self.drop_rest();
+    }
+
     /// Drops what was asked for and not granted.
     pub(crate) fn drop_rest(&mut self) {
         self.actions = self.granted_actions();
@@ -263,22 +287,29 @@ pub(crate) struct Object {
 
 impl Object {
     pub(crate) fn at_start(start: Vec2, goal: Option<Vec2>) -> Self {
-        let status = match goal {
-            Some(goal) if !is_at(start, goal) => TaskStatus::Waiting,
-            _ => TaskStatus::Done,
-        };
-        Self {
+        let mut object = Self {
             position: start,
             rest: start,
             goal,
             holder: None,
             claimed_by: None,
-            status,
-            epoch_status: status,
+            status: TaskStatus::Waiting,
+            epoch_status: TaskStatus::Waiting,
             failures: 0,
             put_downs: 0,
             barred: [0; ROBOT_WORDS],
             epoch_barred: [0; ROBOT_WORDS],
+        };
+        object.status = object.status_on_ground();
+        object.epoch_status = object.status;
+        object
+    }
+
+    /// How its task stands while nobody holds or claims it: done at its goal or without one.
+    pub(crate) fn status_on_ground(&self) -> TaskStatus {
+        match self.goal {
+            Some(goal) if !is_at(self.position, goal) => TaskStatus::Waiting,
+            _ => TaskStatus::Done,
         }
     }
 

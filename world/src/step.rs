@@ -6,7 +6,7 @@
 use scene::{Scene, Settings};
 use shm_types::{
     Checked, Command, ConstraintTable, ControlRequest, EventKind, MotionBatch, Outcome,
-    PlannerReport, WorldSnapshot,
+    PlannerReport, Verdict, WorldSnapshot,
 };
 
 use crate::accounts::{self, ActivityTimes, WorldCounters};
@@ -19,6 +19,7 @@ use crate::grants::{Grants, Surroundings};
 use crate::invariants::Violation;
 use crate::journal::{Event, Journal};
 use crate::motion::{self, Span};
+use crate::schedules::{PublishedSchedule, Schedules};
 use crate::settled::Overflow;
 use crate::state::{Object, Robot};
 use crate::track::Track;
@@ -33,6 +34,8 @@ pub struct WorldInput<'a> {
     pub planner: Option<Checked<'a, PlannerReport>>,
     /// The newest constraint table published.
     pub table: Option<Checked<'a, ConstraintTable>>,
+    /// The newest schedule published.
+    pub schedule: Option<PublishedSchedule<'a>>,
     /// Control requests since the last step, in the order of their arrival.
     pub control: &'a [ControlRequest],
 }
@@ -52,7 +55,9 @@ pub struct World {
     pub(crate) bars: Bars,
     pub(crate) constraints: Constraints,
     pub(crate) epoch: Epoch,
-    pub(crate) schedule_version: u32,
+    pub(crate) schedules: Schedules,
+    /// What the planner says of the run's end.
+    pub(crate) verdict: Verdict,
     pub(crate) busy: u32,
     pub(crate) held: bool,
     pub(crate) stopped: bool,
@@ -92,7 +97,8 @@ impl World {
             bars: Bars::new(robots.len(), objects.len()),
             constraints: Constraints::none(),
             epoch: Epoch::first(),
-            schedule_version: 0,
+            schedules: Schedules::default(),
+            verdict: Verdict::Open,
             busy: 0,
             held: false,
             stopped: false,
@@ -144,8 +150,16 @@ impl World {
         self.lift_bars_of_parked();
         self.open_epoch(&mut journal);
         self.watch(scene, &mut journal);
-        self.busy = accounts::settle(&mut self.robots, planner, self.tick, self.held);
-        self.end_tick(scene, planner, &mut journal);
+        let robots_compute = !self.settings.method.plans_ahead();
+        self.busy = accounts::settle(
+            &mut self.robots,
+            planner,
+            robots_compute,
+            self.tick,
+            self.held,
+        );
+        let rescheduled = self.adopt_schedule(input.schedule);
+        self.end_tick(scene, planner, rescheduled, &mut journal);
         self.write_wire();
         self.chain(Some(&input));
     }
@@ -201,11 +215,13 @@ impl World {
         &mut self,
         scene: &Scene,
         planner: Option<&PlannerReport>,
+        rescheduled: bool,
         journal: &mut Journal<'_>,
     ) {
-        let eventful = journal.is_eventful();
+        let eventful = journal.is_eventful() || rescheduled;
         self.note_overflow(planner, journal);
-        self.schedule_version = planner.map_or(self.schedule_version, |p| p.schedule_version);
+        let said = planner.and_then(|report| Verdict::decode(report.verdict).ok());
+        self.verdict = said.unwrap_or(self.verdict);
         let outcome = self.judge_outcome(scene, planner, eventful);
         self.epoch.change += u64::from(eventful);
         self.tick += 1;
@@ -229,6 +245,12 @@ impl World {
     #[must_use]
     pub const fn outcome(&self) -> Outcome {
         self.outcome
+    }
+
+    /// What the planner has said of the run's end.
+    #[must_use]
+    pub const fn verdict(&self) -> Verdict {
+        self.verdict
     }
 
     /// What the world has counted so far.

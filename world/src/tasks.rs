@@ -8,7 +8,7 @@ use shm_types::{EventKind, Failure, FailureCause, NONE, TaskStatus, index};
 
 use crate::journal::{Event, Journal};
 use crate::path::ARRIVAL_M;
-use crate::state::{Hand, PendingFailure, is_at};
+use crate::state::{Hand, PendingFailure};
 use crate::step::World;
 
 impl World {
@@ -22,12 +22,8 @@ impl World {
         put.put_downs += 1;
         put.holder = None;
         put.claimed_by = None;
-        let done = put.goal.is_none_or(|goal| is_at(put.position, goal));
-        put.status = if done {
-            TaskStatus::Done
-        } else {
-            TaskStatus::Waiting
-        };
+        put.status = put.status_on_ground();
+        let done = put.status == TaskStatus::Done;
         self.bodies.ground.put(object, put.position);
         let robot = &mut self.robots[i];
         robot.claim = None;

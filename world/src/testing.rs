@@ -6,7 +6,7 @@ use scene::{Scene, Settings, Vec2};
 use shm_types::{
     Activity, Checked, Claim, Command, ConstraintTable, ControlKind, ControlRequest, EventKind,
     EventRecord, Failure, FailureCause, Grip, MotionBatch, NONE, ObjectState, PathRequest, Phase,
-    PlannerReport, Point, RobotState, RoleKind, WorldSnapshot,
+    PlannerReport, Point, RobotState, RoleKind, Schedule, WorldSnapshot,
 };
 
 use crate::{World, WorldInput};
@@ -53,6 +53,7 @@ pub(crate) struct Bench {
     pub(crate) commands: Vec<Command>,
     pub(crate) planner: PlannerReport,
     pub(crate) table: Option<Box<ConstraintTable>>,
+    pub(crate) schedule: Option<Box<Schedule>>,
     pub(crate) control: Vec<ControlRequest>,
     pub(crate) batch: Box<MotionBatch>,
     pub(crate) snapshot: Box<WorldSnapshot>,
@@ -77,6 +78,7 @@ impl Bench {
             commands,
             planner: PlannerReport::default(),
             table: None,
+            schedule: None,
             control: Vec::new(),
             batch: shm_types::zeroed(),
             snapshot,
@@ -114,6 +116,10 @@ impl Bench {
             commands: &commands[..self.commands.len()],
             planner: Some(Checked::new(&self.planner, counts).unwrap()),
             table: table.map(|table| Checked::new(table, counts).unwrap()),
+            schedule: self
+                .schedule
+                .as_deref()
+                .map(|schedule| (schedule.version, Checked::new(schedule, counts).ok())),
             control: &self.control,
         };
         self.world.step(&self.scene, input, &mut self.batch);

@@ -27,7 +27,7 @@ impl World {
         header.placements = self.epoch.placements;
         header.constraints_version = self.constraints.in_force.version;
         header.epoch_constraints_version = self.epoch.constraints_version;
-        header.schedule_version = self.schedule_version;
+        header.schedule_version = self.schedules.in_force;
         header.busy = self.busy;
         header.robot_count = id(robots);
         header.object_count = id(objects);
@@ -70,6 +70,7 @@ impl World {
         hash.add(self.bars.counts());
         self.bars.hash_parked(hash);
         self.constraints.hash_into(hash);
+        self.schedules.hash_into(hash);
         hash.add(&[u32::from(self.stopped), self.settled_ticks]);
     }
 }
@@ -133,6 +134,7 @@ fn hash_command(command: &Command, hash: &mut StateHash) {
         command.path.id,
         command.path.count,
         command.path.actions,
+        command.path.schedule_version,
     ]);
     hash.add(&command.claim);
     hash.add(&command.failure);
@@ -163,6 +165,9 @@ fn hash_robot(robot: &Robot, hash: &mut StateHash) {
     hash.add(&[ticks, robot.request_tick]);
     for point in robot.rest.points() {
         hash.add(&scene::point(*point));
+    }
+    if let Some(end) = robot.action_end {
+        hash.add(&scene::point(end));
     }
     for object in robot.leaving.iter() {
         hash.add(&id(object));

@@ -110,6 +110,7 @@ impl Shell {
             commands: &[None; MAX_ROBOTS][..seat.run.robots as usize],
             planner: None,
             table: None,
+            schedule: None,
             control: &[],
         };
         let loan = self.motion.loan_uninit();

@@ -120,7 +120,11 @@ impl Seat {
         Ok(Self {
             role,
             node: ports::join(&run.root, &run.prefix, &role.to_string())?,
-            topics: Topics::of(run.counts(), run.options.monitors),
+            topics: Topics::of(
+                run.counts(),
+                run.options.settings.method,
+                run.options.monitors,
+            ),
             scene,
             latencies: Latencies::new(),
             stop,

@@ -10,7 +10,8 @@ use std::path::Path;
 
 use planner::{Planner, PlannerInput};
 use shm_types::{
-    Checked, ConstraintTable, Counters, HardAnswer, HardRequest, PlannerReport, WorldSnapshot,
+    Checked, ConstraintTable, Counters, HardAnswer, HardRequest, PlannerReport, Schedule,
+    WorldSnapshot,
 };
 use world::FIRST_INCARNATION;
 
@@ -62,6 +63,7 @@ struct Shell {
     /// Those the planner sees in this step, in the order of robots.
     requests: Vec<HardRequest>,
     tables: Publisher<ConstraintTable>,
+    schedules: Option<Publisher<Schedule>>,
     outlet: Publisher<PlannerReport>,
     waker: Option<Waker>,
     counters: Counters,
@@ -70,6 +72,7 @@ struct Shell {
 impl Shell {
     fn new(seat: &Seat) -> Result<Self, RoleError> {
         let (topics, node) = (&seat.topics, &seat.node);
+        let schedules = topics.schedule_service(node, Access::Open)?;
         let most = seat.run.robots as usize * (OPEN_CALLS + 1);
         Ok(Self {
             planner: Planner::new(&seat.scene, seat.options().settings.clone()),
@@ -80,6 +83,7 @@ impl Shell {
                 .constraints
                 .service(node, Access::Open)?
                 .publisher()?,
+            schedules: schedules.map(|service| service.publisher()).transpose()?,
             outlet: topics.planner.service(node, Access::Open)?.publisher()?,
             waker: seat.waker(|| topics.wake_world.service(node, Access::Open)?.waker())?,
             counters: Counters::default(),
@@ -106,6 +110,12 @@ impl Shell {
         self.tables.connect()?;
         if let Some(table) = output.table {
             self.tables.send(|out| out.copy_from(table))?;
+        }
+        if let Some(schedules) = &self.schedules {
+            schedules.connect()?;
+            if let Some(schedule) = output.schedule {
+                schedules.send(|out| out.copy_from(schedule))?;
+            }
         }
         for answer in output.answers {
             let asks = |held: &Held| held.seen && is_answer(&held.question, answer);

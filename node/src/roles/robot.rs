@@ -1,7 +1,7 @@
 //! The loop around one robot.
 //!
-//! Responsible for: bringing a robot its snapshot, its constraint table and its answers, in the
-//! order every driver keeps, and carrying off its command and its questions.
+//! Responsible for: bringing a robot its snapshot, its constraint table or schedule and its
+//! answers, in the order every driver keeps, and carrying off its command and its questions.
 //! Not responsible for: anything the robot decides (crate `robot`).
 //!
 //! The snapshot is read in place. A question is sent before the command of the same tick, so that
@@ -13,7 +13,7 @@ mod timing;
 use std::path::Path;
 
 use robot::{Robot, RobotInput};
-use shm_types::{Checked, Command, WorldSnapshot};
+use shm_types::{Checked, Command, ConstraintTable, Schedule, WorldSnapshot};
 use world::FIRST_INCARNATION;
 
 use crate::clock;
@@ -59,7 +59,10 @@ pub fn main(run_dir: &Path, index: u32) -> Result<(), RoleError> {
 struct Shell {
     index: usize,
     robot: Robot,
-    tables: Tables,
+    tables: Tables<ConstraintTable>,
+    /// The table of version 0.
+    empty: Box<ConstraintTable>,
+    schedules: Option<Tables<Schedule>>,
     questions: Questions,
     outlet: Publisher<Command>,
     waker: Option<Waker>,
@@ -72,10 +75,17 @@ impl Shell {
         let (topics, node) = (&seat.topics, &seat.node);
         let index = index as usize;
         let settings = seat.options().settings.clone();
+        let schedules = topics.schedule_service(node, Access::Open)?;
+        let schedules = schedules.map(|service| Tables::new(&service, seat.counts()));
         Ok(Self {
             index,
             robot: Robot::new(&seat.scene, settings, index, FIRST_INCARNATION),
-            tables: Tables::new(seat)?,
+            tables: Tables::new(
+                &topics.constraints.service(node, Access::Open)?,
+                seat.counts(),
+            )?,
+            empty: ConstraintTable::none(),
+            schedules: schedules.transpose()?,
             questions: Questions::new(topics.hard.service(node, Access::Open)?.client()?),
             outlet: topics.command.service(node, Access::Open)?.publisher()?,
             waker: seat.waker(|| topics.wake_world.service(node, Access::Open)?.waker())?,
@@ -91,13 +101,25 @@ impl Shell {
         snapshot: Checked<'_, WorldSnapshot>,
     ) -> Result<(), RoleError> {
         let header = &snapshot.header;
-        self.tables.receive()?;
+        self.tables.receive(header.epoch_constraints_version)?;
+        if let Some(schedules) = &mut self.schedules {
+            schedules.receive(header.schedule_version)?;
+        }
         self.questions.receive(seat, header.tick)?;
         self.timing
             .see(&snapshot.robots()[self.index], &mut seat.latencies);
+        // The empty one if it is not held: who wants another sees that, and waits.
+        let table = match self.tables.version(header.epoch_constraints_version) {
+            Some(kept) => kept.checked(),
+            None => Checked::new(&*self.empty, seat.counts()),
+        };
+        let schedules = self.schedules.as_ref();
+        let schedule = schedules.and_then(|kept| kept.version(header.schedule_version));
+        let schedule = schedule.map(|kept| kept.checked().map_err(refused("schedule")));
         let input = RobotInput {
             snapshot,
-            table: self.tables.version(header.epoch_constraints_version)?,
+            table: table.map_err(refused("constraints"))?,
+            schedule: schedule.transpose()?,
             answer: self.questions.answer(),
         };
         let units = seat.options().settings.units_per_tick(header.busy);

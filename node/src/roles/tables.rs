@@ -1,85 +1,92 @@
-//! Constraint tables on their way from the planner to those who read them.
+//! What the planner publishes in versions, on its way to those who read it: constraint tables,
+//! schedules.
 //!
-//! Responsible for: holding, in place, the versions that a snapshot may still name.
+//! Responsible for: holding, in place, the versions that a snapshot may still name, and checking
+//! each once.
 //! Not responsible for: which version is in force (the world).
 //!
-//! An epoch opens with every version that comes into force, so a snapshot names the newest
-//! version or the one before it.
+//! A snapshot names the newest version or the one before it that came into force.
 
 use std::collections::VecDeque;
 
-use shm_types::{Checked, ConstraintTable, Counts};
+use shm_types::{Checked, Counts, Invalid, Versioned};
 
-use crate::ports::{Access, Sample, Subscriber};
-use crate::roles::{RoleError, Seat, refused};
+use crate::ports::{Sample, Service, Subscriber, TopicError};
+use crate::wire::Message;
 
 /// Versions held.
 const KEPT: usize = 2;
 
-/// The newest tables.
-pub(crate) struct Tables {
-    inlet: Subscriber<ConstraintTable>,
+/// The newest of all that was published.
+pub(crate) struct Tables<T: Message> {
+    inlet: Subscriber<T>,
     counts: Counts,
-    /// Version 0.
-    empty: Box<ConstraintTable>,
     /// Oldest first.
-    kept: VecDeque<Sample<ConstraintTable>>,
+    kept: VecDeque<Kept<T>>,
 }
 
-impl Tables {
+/// A version that is held.
+pub(crate) struct Kept<T: Message> {
+    sample: Sample<T>,
+    invalid: Option<Invalid>,
+}
+
+impl<T: Message + Versioned> Kept<T> {
+    /// Its version, legal or not.
+    pub(crate) fn version(&self) -> u32 {
+        self.sample.version()
+    }
+
+    /// The message, checked.
+    ///
+    /// # Errors
+    /// It is no legal message.
+    pub(crate) fn checked(&self) -> Result<Checked<'_, T>, Invalid> {
+        match self.invalid {
+            // A sample does not change.
+            None => Ok(Checked::as_before(&*self.sample)),
+            Some(invalid) => Err(invalid),
+        }
+    }
+}
+
+impl<T: Message + Versioned> Tables<T> {
     /// Nothing received yet.
     ///
     /// # Errors
     /// The port cannot be made.
-    pub(crate) fn new(seat: &Seat) -> Result<Self, RoleError> {
-        let service = seat.topics.constraints.service(&seat.node, Access::Open)?;
+    pub(crate) fn new(service: &Service<T>, counts: Counts) -> Result<Self, TopicError> {
         Ok(Self {
             inlet: service.subscriber()?,
-            counts: seat.counts(),
-            empty: ConstraintTable::none(),
+            counts,
             kept: VecDeque::with_capacity(KEPT + 1),
         })
     }
 
-    /// Takes in what has been published.
+    /// Takes in what has been published. The version in force is kept, and the newest.
     ///
     /// # Errors
     /// Shared memory failed.
-    pub(crate) fn receive(&mut self) -> Result<(), RoleError> {
-        while let Some(table) = self.inlet.receive()? {
-            self.kept.push_back(table);
+    pub(crate) fn receive(&mut self, in_force: u32) -> Result<(), TopicError> {
+        while let Some(sample) = self.inlet.receive()? {
+            let invalid = sample.validate(self.counts).err();
+            self.kept.push_back(Kept { sample, invalid });
             if self.kept.len() > KEPT {
-                self.kept.pop_front();
+                let first_is_in_force = self.kept[0].version() == in_force;
+                self.kept.remove(usize::from(first_is_in_force));
             }
         }
         Ok(())
     }
 
-    /// The newest table; `None` before the first.
-    ///
-    /// # Errors
-    /// It is no legal message.
-    pub(crate) fn newest(&self) -> Result<Option<Checked<'_, ConstraintTable>>, RoleError> {
-        self.kept.back().map(|table| self.check(table)).transpose()
+    /// The newest; `None` before the first.
+    pub(crate) fn newest(&self) -> Option<&Kept<T>> {
+        self.kept.back()
     }
 
-    /// The table of this version. The empty one if it is not held: its reader sees that it is not
-    /// the one it wants, and waits.
-    ///
-    /// # Errors
-    /// It is no legal message.
-    pub(crate) fn version(&self, version: u32) -> Result<Checked<'_, ConstraintTable>, RoleError> {
-        let kept = self
-            .kept
-            .iter()
-            .find(|table| version > 0 && table.version == version);
-        self.check(kept.map_or(&*self.empty, |table| table))
-    }
-
-    fn check<'a>(
-        &self,
-        table: &'a ConstraintTable,
-    ) -> Result<Checked<'a, ConstraintTable>, RoleError> {
-        Checked::new(table, self.counts).map_err(refused("constraints"))
+    /// The one of this version, if it is held.
+    pub(crate) fn version(&self, version: u32) -> Option<&Kept<T>> {
+        let mut kept = self.kept.iter();
+        kept.find(|kept| version > 0 && kept.version() == version)
     }
 }

@@ -178,6 +178,7 @@ impl Shell {
             commands: &commands[..seat.run.robots as usize],
             planner: self.ears.report()?,
             table: self.ears.table()?,
+            schedule: self.ears.schedule(),
             control: &self.control,
         };
         let world = &mut self.world;
@@ -245,6 +246,7 @@ impl Shell {
         });
         WorldReport {
             outcome: world.outcome().code(),
+            verdict: world.verdict().code(),
             reason: world.reason(&seat.scene),
             ticks: self.tick,
             time_ns: self.tick * seat.options().settings.tick_ns,
@@ -252,6 +254,8 @@ impl Shell {
             hard_constraints: counters.constraints_found,
             task_failures: counters.task_failures,
             grants_refused: counters.grants_refused,
+            invalid_requests: counters.invalid_requests,
+            schedules_refused: counters.schedules_refused,
             selection_conflicts: counters.selection_conflicts,
             violations: counters.violations,
             swept_tests: counters.swept_tests,

@@ -53,7 +53,7 @@ fn write_snapshot(snapshot: &mut WorldSnapshot, tick: u64) {
 #[test]
 fn a_late_joiner_gets_the_newest_snapshot_and_reads_it_in_place() {
     let domain = Domain::new("late");
-    let topics = Topics::of(COUNTS, 0);
+    let topics = Topics::of(COUNTS, Method::NoAction, 0);
     let (supervisor, world, robot) = (domain.node("s"), domain.node("w"), domain.node("r"));
     let _held = topics.create(&supervisor).unwrap();
     let publisher = topics
@@ -88,7 +88,7 @@ fn a_late_joiner_gets_the_newest_snapshot_and_reads_it_in_place() {
 #[test]
 fn questions_are_answered_while_the_next_is_open() {
     let domain = Domain::new("hard");
-    let topics = Topics::of(COUNTS, 0);
+    let topics = Topics::of(COUNTS, Method::NoAction, 0);
     let (supervisor, planner, robot) = (domain.node("s"), domain.node("p"), domain.node("r"));
     let _held = topics.create(&supervisor).unwrap();
     let server = topics
@@ -138,7 +138,7 @@ fn questions_are_answered_while_the_next_is_open() {
 #[test]
 fn a_wake_up_before_the_sleep_is_not_lost() {
     let domain = Domain::new("wake");
-    let topics = Topics::of(COUNTS, 0);
+    let topics = Topics::of(COUNTS, Method::NoAction, 0);
     let node = domain.node("s");
     let _held = topics.create(&node).unwrap();
     let service = topics.wake_world.service(&node, Access::Open).unwrap();
@@ -151,7 +151,7 @@ fn a_wake_up_before_the_sleep_is_not_lost() {
 #[test]
 fn a_topic_of_another_layout_is_refused() {
     let domain = Domain::new("layout");
-    let topics = Topics::of(COUNTS, 0);
+    let topics = Topics::of(COUNTS, Method::NoAction, 0);
     let node = domain.node("s");
     let _held = topics.create(&node).unwrap();
     let mistaken: Topic<PlannerReport> = topic(topics.world.name, 1, 1, 1, 1, 1, 2);

@@ -1,7 +1,7 @@
 //! All that the world hears.
 //!
-//! Responsible for: the newest command of each robot, the planner's newest report and the table
-//! it goes with, how far the recorder has come, requests of control; and whether everybody has
+//! Responsible for: the newest command of each robot, the planner's newest report, the table and
+//! the schedule that go with it, how far the recorder has come, requests of control; and whether everybody has
 //! answered a tick.
 //! Not responsible for: what any of it means to the world (crate `world`).
 //!
@@ -11,9 +11,9 @@
 use shm_types::capacity::MAX_ROBOTS;
 use shm_types::{
     Checked, Command, ConstraintTable, ControlKind, ControlReply, ControlRequest, Counts,
-    PlannerReport, RecorderReport, RoleKind, Validate,
+    PlannerReport, RecorderReport, RoleKind, Schedule, Validate,
 };
-use world::{FIRST_INCARNATION, World};
+use world::{FIRST_INCARNATION, PublishedSchedule, World};
 
 use crate::calls::Server;
 use crate::ports::{Access, Subscriber};
@@ -41,7 +41,8 @@ pub(super) struct Ears {
     planner: Subscriber<PlannerReport>,
     recorder: Subscriber<RecorderReport>,
     control: Server<ControlRequest, ControlReply>,
-    tables: Tables,
+    tables: Tables<ConstraintTable>,
+    schedules: Option<Tables<Schedule>>,
     robots: Vec<Robot>,
     report: Option<PlannerReport>,
     recorded: Option<RecorderReport>,
@@ -52,6 +53,9 @@ pub(super) struct Ears {
 impl Ears {
     pub(super) fn new(seat: &Seat) -> Result<Self, RoleError> {
         let (topics, node) = (&seat.topics, &seat.node);
+        let schedules = topics.schedule_service(node, Access::Open)?;
+        let schedules = schedules.map(|service| Tables::new(&service, seat.counts()));
+        let constraints = topics.constraints.service(node, Access::Open)?;
         let robot = Robot {
             live: true,
             incarnation: FIRST_INCARNATION,
@@ -63,7 +67,8 @@ impl Ears {
             planner: topics.planner.service(node, Access::Open)?.subscriber()?,
             recorder: topics.recorder.service(node, Access::Open)?.subscriber()?,
             control: topics.control.service(node, Access::Open)?.server()?,
-            tables: Tables::new(seat)?,
+            tables: Tables::new(&constraints, seat.counts())?,
+            schedules: schedules.transpose()?,
             robots: vec![robot; seat.run.robots as usize],
             report: None,
             recorded: None,
@@ -81,7 +86,10 @@ impl Ears {
             Checked::new(&*report, self.counts).map_err(refused("planner"))?;
             self.report = Some(*report);
         }
-        self.tables.receive()?;
+        self.tables.receive(0)?;
+        if let Some(schedules) = &mut self.schedules {
+            schedules.receive(0)?;
+        }
         if let Some(report) = self.recorder.receive()? {
             Checked::new(&*report, self.counts).map_err(refused("recorder"))?;
             self.recorded = Some(*report);
@@ -183,7 +191,16 @@ impl Ears {
 
     /// The newest constraint table.
     pub(super) fn table(&self) -> Result<Option<Checked<'_, ConstraintTable>>, RoleError> {
-        self.tables.newest()
+        let newest = self.tables.newest();
+        newest
+            .map(|kept| kept.checked().map_err(refused("constraints")))
+            .transpose()
+    }
+
+    /// The newest schedule.
+    pub(super) fn schedule(&self) -> Option<PublishedSchedule<'_>> {
+        let newest = self.schedules.as_ref()?.newest()?;
+        Some((newest.version(), newest.checked().ok()))
     }
 
     /// Commands that never came, or were no legal ones.

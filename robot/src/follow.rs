@@ -1,0 +1,254 @@
+//! Following the schedule of a planner that plans ahead: action after action.
+//!
+//! Responsible for: which actions to ask the world for, and when; claims and grips on the way.
+//! Not responsible for: the schedule (crate `planner`), which version is in force and what is
+//! granted (the world).
+//!
+//! Nearly all follows from the snapshot: how many actions are granted, whether the robot stands,
+//! what it holds, how often objects were put down. So a process that is started in the middle
+//! goes on where the one before it stopped.
+//!
+//! Terms: an action's grip is *due* from when the action is granted until the object is held or
+//! put down; nothing past it is asked for until then.
+
+use scene::{ARRIVAL_M, Settings, vec};
+use shm_types::{
+    Action, Activity, Grip, PathRequest, Phase, RobotSchedule, Schedule, StateHash, index,
+};
+
+use crate::account::Doing;
+use crate::intent::Intent;
+use crate::now::Now;
+use crate::request::Fate;
+use crate::select;
+
+/// Most actions asked for at once, and most corners granted ahead of which more is asked for.
+const ACTIONS_AHEAD: usize = 8;
+
+/// What a follower remembers.
+pub(crate) struct Follower {
+    look_again_ns: u64,
+    started: bool,
+    /// The action that the newest request ends with, and its number: a schedule that comes into
+    /// force after it was granted may not list it any more.
+    last: Option<(u32, Action)>,
+    /// When that was asked for.
+    asked_ns: u64,
+}
+
+/// A grip that is due.
+#[derive(Clone, Copy, Debug)]
+struct Due {
+    grip: Grip,
+    object: usize,
+    /// For a grasp: how often the object must have been put down.
+    turn: u32,
+}
+
+impl Follower {
+    /// Nothing asked for yet.
+    pub(crate) fn new(settings: &Settings) -> Self {
+        Self {
+            look_again_ns: settings.look_again_ns,
+            started: false,
+            last: None,
+            asked_ns: 0,
+        }
+    }
+
+    /// What the robot is doing, and what that counts as, in this tick.
+    pub(crate) fn act(&mut self, now: &Now<'_>, intent: &mut Intent) -> (Phase, Doing) {
+        if !self.started {
+            self.started = true;
+            intent.take_up(now);
+        }
+        let Some(schedule) = now.schedule else {
+            intent.claim = select::claim(now, now.holding());
+            return (Phase::Selecting, without_schedule(now));
+        };
+        let part = &schedule.robots[now.id];
+        let due = self.due(now, schedule);
+        let next = next_grasp(now, schedule, due);
+        intent.claim = select::claim(now, now.holding().or_else(|| may_claim(now, next)));
+        match due {
+            Some(due) if now.me().grant_count == 0 => grip(now, due),
+            Some(_) => (under_way(now, next, part), Doing::waiting(u64::MAX)),
+            None => {
+                let doing = self.go_on(now, schedule, intent);
+                (under_way(now, next, part), doing)
+            }
+        }
+    }
+
+    /// The grip that the last granted action ends with, if it is due.
+    fn due(&self, now: &Now<'_>, schedule: &Schedule) -> Option<Due> {
+        let number = now.me().actions.checked_sub(1)?;
+        let remembered = self.last.as_ref().filter(|(last, _)| *last == number);
+        let action = schedule
+            .action(now.id, number)
+            .or(remembered.map(|(_, action)| action))?;
+        let due = Due {
+            grip: Grip::decode(action.grip).ok()?,
+            object: index(action.object)?,
+            turn: action.turn,
+        };
+        let is_due = match due.grip {
+            Grip::Keep => false,
+            Grip::Grasp => now.holding() != Some(due.object) && put_downs(now, due) <= due.turn,
+            Grip::Release => now.holding() == Some(due.object),
+        };
+        is_due.then_some(due)
+    }
+
+    /// Asks for what comes next as soon as it may.
+    fn go_on(&mut self, now: &Now<'_>, schedule: &Schedule, intent: &mut Intent) -> Doing {
+        let me = now.me();
+        let part = &schedule.robots[now.id];
+        match intent.asked.fate(me) {
+            Fate::Sent | Fate::Open => return Doing::waiting(u64::MAX),
+            Fate::Granted | Fate::Refused => {}
+        }
+        if me.actions >= part.first + part.count {
+            return at_end(now, part);
+        }
+        let asked = intent.asked.request();
+        let is_refused = asked.schedule_version == schedule.version && asked.actions > me.actions;
+        if is_refused && now.time_ns() < self.asked_ns + self.look_again_ns {
+            return Doing::waiting(now.counted().change);
+        }
+        if (me.grant_count as usize) < ACTIONS_AHEAD
+            && let Some(request) = batch(now, schedule)
+        {
+            let last = request.actions - 1;
+            self.last = schedule.action(now.id, last).map(|action| (last, *action));
+            self.asked_ns = now.time_ns();
+            intent.asked.ask_for(request, intent.sequence);
+        }
+        Doing::waiting(u64::MAX)
+    }
+
+    /// Adds what it remembers, in a fixed order.
+    pub(crate) fn hash_into(&self, hash: &mut StateHash) {
+        hash.add(&[u64::from(self.started), self.asked_ns]);
+        if let Some((number, action)) = &self.last {
+            hash.add(number);
+            hash.add(action);
+        }
+    }
+}
+
+/// No schedule is in force, or the one in force has not come yet.
+fn without_schedule(now: &Now<'_>) -> Doing {
+    waiting_for_planner(match now.snapshot.header.schedule_version {
+        0 => now.counted().change,
+        _ => u64::MAX,
+    })
+}
+
+/// All that is listed is granted: it is done, or waits for the planner to list more.
+fn at_end(now: &Now<'_>, part: &RobotSchedule) -> Doing {
+    let change = now.counted().change;
+    match (now.me().grant_count, part.complete) {
+        (0, 1) => Doing::idle(change),
+        (0, _) => waiting_for_planner(change),
+        _ => Doing::waiting(u64::MAX),
+    }
+}
+
+/// Waits for a computation, though not its own. What is granted is driven meanwhile.
+fn waiting_for_planner(settled_at_change: u64) -> Doing {
+    Doing {
+        activity: Activity::Computing,
+        ..Doing::waiting(settled_at_change)
+    }
+}
+
+/// Stands where a grip is due.
+fn grip(now: &Now<'_>, due: Due) -> (Phase, Doing) {
+    match due.grip {
+        Grip::Grasp if put_downs(now, due) < due.turn => {
+            (Phase::Grasping, Doing::waiting(u64::MAX))
+        }
+        Grip::Release => (Phase::Releasing, Doing::gripping(due.grip)),
+        Grip::Grasp | Grip::Keep => (Phase::Grasping, Doing::gripping(due.grip)),
+    }
+}
+
+fn put_downs(now: &Now<'_>, due: Due) -> u32 {
+    now.snapshot.objects()[due.object].put_downs
+}
+
+/// The object grasped next, and the turn for it: now, or by an action ahead.
+fn next_grasp(now: &Now<'_>, schedule: &Schedule, due: Option<Due>) -> Option<(usize, u32)> {
+    if let Some(due) = due
+        && due.grip == Grip::Grasp
+    {
+        return Some((due.object, due.turn));
+    }
+    let first = schedule.robots[now.id].first;
+    let granted = now.me().actions.saturating_sub(first) as usize;
+    let mut ahead = schedule.actions_of(now.id).iter().skip(granted);
+    let grasp = ahead.find(|action| action.grip == Grip::Grasp.code())?;
+    Some((index(grasp.object)?, grasp.turn))
+}
+
+/// The object to claim: the one grasped next, as soon as nobody else has to move it first.
+fn may_claim(now: &Now<'_>, next: Option<(usize, u32)>) -> Option<usize> {
+    let (object, turn) = next?;
+    let state = &now.snapshot.objects()[object];
+    let free = index(state.claimed_by).is_none_or(|robot| robot == now.id);
+    (state.put_downs == turn && index(state.holder).is_none() && free).then_some(object)
+}
+
+/// What it does between grips.
+fn under_way(now: &Now<'_>, next: Option<(usize, u32)>, part: &RobotSchedule) -> Phase {
+    let me = now.me();
+    let at_end = me.grant_count == 0 && me.actions >= part.first + part.count;
+    match (now.holding(), next) {
+        (Some(_), _) => Phase::Transfer,
+        (None, Some(_)) => Phase::Transit,
+        (None, None) if at_end => Phase::Idle,
+        (None, None) => Phase::GoingHome,
+    }
+}
+
+/// The next actions to ask for: those whose waits are over, up to the first grip. An action that
+/// goes nowhere is asked for by itself.
+fn batch(now: &Now<'_>, schedule: &Schedule) -> Option<PathRequest> {
+    let me = now.me();
+    let start = now.grant_end();
+    let mut request = PathRequest {
+        actions: me.actions,
+        schedule_version: schedule.version,
+        count: 1,
+        ..PathRequest::default()
+    };
+    request.points[0] = scene::point(start);
+    let mut at = start;
+    while request.count as usize <= ACTIONS_AHEAD
+        && let Some(action) = schedule.action(now.id, request.actions)
+        && waits_are_over(now, schedule, action)
+    {
+        let to = vec(action.to);
+        if (to - at).norm() <= ARRIVAL_M {
+            if request.count == 1 {
+                request.actions += 1;
+            }
+            break;
+        }
+        request.points[request.count as usize] = action.to;
+        request.count += 1;
+        request.actions += 1;
+        at = to;
+        if action.grip != Grip::Keep.code() {
+            break;
+        }
+    }
+    (request.actions > me.actions).then_some(request)
+}
+
+fn waits_are_over(now: &Now<'_>, schedule: &Schedule, action: &Action) -> bool {
+    let robots = now.snapshot.robots();
+    let mut waits = schedule.waits_of(action).iter();
+    waits.all(|wait| robots[wait.robot as usize].actions >= wait.actions)
+}
