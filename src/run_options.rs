@@ -59,7 +59,7 @@ pub(crate) struct RunArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Method")]
 pub(crate) struct MethodArgs {
-    /// Which constraints are worked out before a selection and on a failure
+    /// Which constraints are worked out before a selection and on a failure; `anytime` plans ahead instead
     #[arg(long, default_value = "grasping-and-restricted", value_parser = named::<Method>(&METHODS))]
     pub(crate) method: Method,
     /// Hard constraints: each pair tested once, or anew at every event
@@ -76,8 +76,14 @@ pub(crate) struct MethodArgs {
     pub(crate) units_per_second: Option<u64>,
 }
 
-/// Names of the methods, as section IV of the paper orders them.
-pub(crate) const METHODS: [&str; 4] = ["grasping-and-restricted", "restricted", "all", "no-action"];
+/// Names of the methods: the paper's as its section IV orders them, then that which plans ahead.
+pub(crate) const METHODS: [&str; 5] = [
+    "grasping-and-restricted",
+    "restricted",
+    "all",
+    "no-action",
+    "anytime",
+];
 const MAX_UNITS: u64 = 1_000_000_000_000;
 const MAX_ROBOTS: i64 = shm_types::capacity::MAX_ROBOTS as i64;
 

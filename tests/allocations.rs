@@ -4,9 +4,13 @@
 //! Tick 0 is left out only because it is where memory set aside by then is first written.
 #![expect(clippy::unwrap_used, reason = "a test may fail")]
 
+mod plans;
+
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
+use planner::Planner;
+use plans::{CORRIDOR, corridor};
 use scene::{HardMode, Method, Scene, Settings, builtin};
 use shm_types::{Activity, Outcome};
 use sim::Simulation;
@@ -66,7 +70,10 @@ fn scene(name: &str) -> Scene {
 
 /// Runs to the end and checks that nothing was allocated from tick 1 on.
 fn run(scene: &Scene, settings: &Settings) -> sim::SimReport {
-    let mut simulation = Simulation::new(scene, settings, 1);
+    run_on(Simulation::new(scene, settings, 1), scene, settings)
+}
+
+fn run_on(mut simulation: Simulation<'_>, scene: &Scene, settings: &Settings) -> sim::SimReport {
     simulation.tick();
     let asked = allocations(|| {
         while simulation.outcome() == Outcome::Running {
@@ -119,6 +126,19 @@ fn complete_runs_allocate_nothing() {
             "{method}"
         );
     }
+}
+
+#[test]
+fn following_a_schedule_allocates_nothing() {
+    let scene = scene::parse(CORRIDOR, "corridor").unwrap_or_else(|e| panic!("{e:?}"));
+    let settings = Settings {
+        method: Method::Anytime,
+        ..Settings::default()
+    };
+    let planner = Planner::with_schedule(&scene, settings.clone(), corridor());
+    let simulation = Simulation::new(&scene, &settings, 1).with_planner(planner);
+    let report = run_on(simulation, &scene, &settings);
+    assert_eq!(report.outcome, Outcome::Solved, "{:?}", report.reason);
 }
 
 #[test]

@@ -165,6 +165,19 @@ fn whoever_is_slow_the_states_are_the_same() {
 }
 
 #[test]
+fn robots_that_follow_a_schedule_reach_the_same_states() {
+    let room = "h1";
+    let method = ["--method", "anytime"];
+    let expected = hashes(room, &[IN_PROCESS, &method].concat());
+    assert_same(room, &expected, &hashes(room, &method), "nobody delayed");
+    for role in ["planner", "robot-1"] {
+        let delay = format!("{role}=50x30");
+        let delayed = [&["--delay", delay.as_str()][..], &method].concat();
+        assert_same(room, &expected, &hashes(room, &delayed), &delay);
+    }
+}
+
+#[test]
 fn lockstep_waits_for_a_stopped_robot() {
     let room = "paper-17a";
     let expected = hashes(room, IN_PROCESS);

@@ -4,8 +4,9 @@ use std::mem::offset_of;
 
 use proptest::prelude::*;
 use shm_types::{
-    Checked, Command, ConstraintTable, Counts, Invalid, MotionBatch, NONE, ObjectState, RobotState,
-    SnapshotHeader, StateHash, Validate, WorldSnapshot, zeroed,
+    Action, Checked, Command, ConstraintTable, Counts, Grip, Invalid, MotionBatch, NONE,
+    ObjectState, RobotSchedule, RobotState, Schedule, SnapshotHeader, StateHash, Validate, Wait,
+    WorldSnapshot, zeroed,
 };
 use zerocopy::{FromBytes, IntoBytes};
 
@@ -180,6 +181,72 @@ fn constraints_must_be_sorted_in_range_and_not_reflexive() {
     assert!(table.validate(COUNTS).is_err());
 }
 
+/// Two robots with two actions and one action, and a wait.
+fn schedule() -> Box<Schedule> {
+    let mut schedule: Box<Schedule> = zeroed();
+    (schedule.version, schedule.robot_count) = (1, COUNTS.robots);
+    (schedule.action_count, schedule.wait_count) = (3, 1);
+    for (part, (first, count, offset)) in schedule.robots.iter_mut().zip([(5, 2, 0), (0, 1, 2)]) {
+        *part = RobotSchedule {
+            first,
+            count,
+            offset,
+            complete: 1,
+        };
+    }
+    for action in &mut schedule.actions[..3] {
+        action.object = NONE;
+    }
+    (schedule.actions[1].grip, schedule.actions[1].object) = (Grip::Grasp.code(), 2);
+    schedule.actions[2].waits = 1;
+    schedule.waits[0] = Wait {
+        robot: 0,
+        actions: 7,
+    };
+    schedule
+}
+
+#[test]
+fn a_schedule_with_one_bad_value_is_refused() {
+    type Plant = fn(&mut Schedule);
+    let plants: [(Plant, &str); 16] = [
+        (|s| s.robot_count = 1, "other run"),
+        (|s| s.action_count = 16_385, "actions over capacity"),
+        (|s| s.action_count = 2, "actions past the live ones"),
+        (|s| s.wait_count = 65_537, "waits over capacity"),
+        (|s| s.wait_count = 0, "waits past the live ones"),
+        (|s| s.robots[0].complete = 2, "complete"),
+        (|s| s.robots[1].offset = u32::MAX, "offset"),
+        (|s| s.robots[1].count = u32::MAX, "count"),
+        (|s| s.robots[1].first = u32::MAX, "number"),
+        (|s| s.actions[0].to.x = f64::INFINITY, "place"),
+        (|s| s.actions[0].grip = 3, "grip"),
+        (|s| s.actions[0].object = 3, "object"),
+        (|s| s.actions[1].object = NONE, "grasp of nothing"),
+        (|s| s.actions[2].first_wait = 1, "range of waits"),
+        (|s| s.actions[2].first_wait = u32::MAX, "range of waits"),
+        (|s| s.waits[0].robot = 2, "robot waited for"),
+    ];
+    assert_eq!(schedule().validate(COUNTS), Ok(()));
+    for (plant, what) in plants {
+        let mut schedule = schedule();
+        plant(&mut schedule);
+        assert!(schedule.validate(COUNTS).is_err(), "{what} was let through");
+    }
+}
+
+#[test]
+fn actions_have_numbers_over_the_whole_run() {
+    let schedule = schedule();
+    let waits = |action: &Action| schedule.waits_of(action).len();
+    assert!(schedule.action(0, 4).is_none(), "past");
+    assert_eq!(schedule.action(0, 5).map(waits), Some(0));
+    assert_eq!(schedule.action(0, 6).map(|action| action.object), Some(2));
+    assert!(schedule.action(0, 7).is_none(), "robot 1's");
+    assert_eq!(schedule.action(1, 0).map(waits), Some(1));
+    assert!(schedule.action(2, 0).is_none());
+}
+
 #[test]
 fn no_id_is_none() {
     assert_eq!(shm_types::index(NONE), None);
@@ -207,6 +274,45 @@ proptest! {
             prop_assert_eq!(checked.robots().len(), 2);
             prop_assert!(checked.robots().iter().all(|r| r.position.is_finite() && r.grant().len() <= 32));
         }
+    }
+
+    #[test]
+    fn a_flipped_schedule_is_refused_or_sound(flips in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20)) {
+        let mut schedule = schedule();
+        let (robots, actions, waits) = (
+            offset_of!(Schedule, robots), offset_of!(Schedule, actions), offset_of!(Schedule, waits),
+        );
+        let live: Vec<usize> = (0..robots + 2 * size_of::<RobotSchedule>())
+            .chain(actions..actions + 3 * size_of::<Action>())
+            .chain(waits..waits + size_of::<Wait>())
+            .collect();
+        for (at, value) in flips {
+            schedule.as_mut_bytes()[live[at.index(live.len())]] = value;
+        }
+        if let Ok(checked) = Checked::new(&*schedule, COUNTS) {
+            for robot in 0..2 {
+                prop_assert_eq!(checked.actions_of(robot).len(), checked.robots[robot].count as usize);
+                for action in checked.actions_of(robot) {
+                    prop_assert!(action.to.is_finite() && (action.object == NONE || action.object < 3));
+                    prop_assert_eq!(checked.waits_of(action).len(), action.waits as usize);
+                    prop_assert!(checked.waits_of(action).iter().all(|wait| wait.robot < 2));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn random_schedules_are_checked_without_panic(seed in any::<u64>()) {
+        let mut schedule: Box<Schedule> = zeroed();
+        let mut x = seed | 1;
+        for byte in &mut schedule.as_mut_bytes()[..8192] {
+            x ^= x << 13; x ^= x >> 7; x ^= x << 17;
+            *byte = x as u8;
+        }
+        // Counts within capacity, so that all that follows is looked at too.
+        (schedule.robot_count, schedule.action_count) = (2, 16_384);
+        schedule.wait_count %= 65_537;
+        let _ = Checked::new(&*schedule, COUNTS).map(|s| s.actions_of(0).len());
     }
 
     #[test]

@@ -8,7 +8,7 @@ fn unknown_words_name_the_allowed_ones() {
         (
             "--method",
             "fast",
-            "grasping-and-restricted, restricted, all, no-action",
+            "grasping-and-restricted, restricted, all, no-action, anytime",
         ),
         ("--hard", "maybe", "cached, literal"),
         ("--performance", "x", "transit-and-transfer, transfer"),

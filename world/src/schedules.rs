@@ -77,3 +77,289 @@ fn goes_on(schedule: &Schedule, i: usize, robot: &Robot) -> bool {
     };
     part.first <= granted && granted <= part.first + part.count && last_is_same && part_is_same
 }
+
+#[cfg(test)]
+mod tests {
+    use scene::{Method, Settings};
+    use shm_types::{
+        Action, ControlKind, Grip, NONE, Outcome, Point, RobotSchedule, Schedule, TaskStatus,
+        Verdict, zeroed,
+    };
+
+    use crate::testing::{BELOW, Bench, room};
+
+    /// Object 0 stands where robot 0 may grasp it, object 1 at its goal, robot 1 beside it.
+    const OBJECTS: [[[f64; 2]; 2]; 2] = [[[1.0, 1.45], [5.0, 5.0]], [[8.0, 1.45], [8.0, 1.45]]];
+
+    fn bench() -> Bench {
+        let settings = Settings {
+            method: Method::Anytime,
+            ..Settings::default()
+        };
+        let homes = [[1.0, 1.0], [8.0, 1.0]];
+        Bench::with(room(&homes, &OBJECTS, BELOW, ""), settings)
+    }
+
+    /// Robot 0's actions are numbered from `first` and lead to these places; robot 1 has none.
+    fn schedule(version: u32, first: u32, places: &[[f64; 2]]) -> Box<Schedule> {
+        let mut schedule: Box<Schedule> = zeroed();
+        (schedule.version, schedule.robot_count) = (version, 2);
+        let count = places.len() as u32;
+        schedule.action_count = count;
+        schedule.robots[0] = RobotSchedule {
+            first,
+            count,
+            offset: 0,
+            complete: 1,
+        };
+        for (action, place) in schedule.actions.iter_mut().zip(places) {
+            *action = Action {
+                to: Point::new(place[0], place[1]),
+                grip: Grip::Keep.code(),
+                object: NONE,
+                turn: 0,
+                first_wait: 0,
+                waits: 0,
+                reserved: 0,
+            };
+        }
+        schedule
+    }
+
+    const PLACES: [[f64; 2]; 3] = [[2.0, 1.0], [3.0, 1.0], [4.0, 1.0]];
+
+    /// A world in which `PLACES` are in force.
+    fn scheduled() -> Bench {
+        let mut bench = bench();
+        bench.schedule = Some(schedule(1, 0, &PLACES));
+        bench.step();
+        assert_eq!(bench.header().schedule_version, 1);
+        bench
+    }
+
+    /// Asks for `corners`, each of which ends an action, under the version in force.
+    fn ask(bench: &mut Bench, corners: &[[f64; 2]]) {
+        bench.ask(0, corners);
+        let actions = bench.robot(0).actions + corners.len() as u32;
+        let version = bench.header().schedule_version;
+        let path = &mut bench.commands[0].path;
+        (path.actions, path.schedule_version) = (actions, version);
+    }
+
+    fn refused(bench: &Bench) -> u64 {
+        bench.world.counters().schedules_refused
+    }
+
+    #[test]
+    fn a_schedule_comes_into_force_at_the_tick_it_names_and_is_a_change() {
+        let mut bench = bench();
+        let mut plan = schedule(1, 0, &PLACES);
+        plan.effect_tick = 3;
+        bench.schedule = Some(plan);
+        bench.steps(2);
+        let change = bench.header().change;
+        assert_eq!(bench.header().schedule_version, 0);
+        bench.step();
+        assert_eq!(
+            (bench.header().tick, bench.header().schedule_version),
+            (3, 1)
+        );
+        assert_eq!(bench.header().change, change + 1);
+        bench.step();
+        assert_eq!(bench.header().change, change + 1, "once");
+    }
+
+    #[test]
+    fn the_papers_methods_know_no_schedule() {
+        let mut bench = Bench::new(room(&[[1.0, 1.0], [8.0, 1.0]], &OBJECTS, BELOW, ""));
+        bench.schedule = Some(schedule(1, 0, &PLACES));
+        bench.planner.schedule_version = 1;
+        bench.steps(3);
+        assert_eq!((bench.header().schedule_version, refused(&bench)), (0, 0));
+    }
+
+    #[test]
+    fn points_granted_are_actions_granted() {
+        let mut bench = scheduled();
+        ask(&mut bench, &PLACES[..2]);
+        bench.step();
+        assert_eq!(bench.robot(0).actions, 2);
+        // What goes nowhere is granted at once.
+        bench.steps(500);
+        ask(&mut bench, &[]);
+        bench.commands[0].path.actions = 3;
+        bench.step();
+        assert_eq!((bench.robot(0).actions, bench.robot(0).grant_count), (3, 0));
+        assert_eq!(bench.world.counters().invalid_requests, 0);
+    }
+
+    #[test]
+    fn a_request_that_miscounts_its_actions_is_no_sound_one() {
+        for (corners, actions) in [(&PLACES[..2], 1), (&PLACES[..2], 3), (&[PLACES[0]; 2], 2)] {
+            let mut bench = scheduled();
+            ask(&mut bench, corners);
+            bench.commands[0].path.actions = actions;
+            bench.step();
+            assert_eq!(bench.world.counters().invalid_requests, 1);
+            assert_eq!((bench.robot(0).actions, bench.robot(0).grant_count), (0, 0));
+        }
+    }
+
+    #[test]
+    fn a_request_of_another_version_is_dropped_without_blame() {
+        let mut bench = scheduled();
+        ask(&mut bench, &PLACES[..1]);
+        bench.commands[0].path.schedule_version = 2;
+        bench.step();
+        assert_eq!(bench.robot(0).request, bench.commands[0].path.id, "taken");
+        assert_eq!((bench.robot(0).actions, bench.robot(0).grant_count), (0, 0));
+        assert_eq!(bench.world.counters().invalid_requests, 0);
+    }
+
+    #[test]
+    fn a_schedule_that_does_not_go_on_from_what_is_granted_is_refused_once() {
+        let plans = [
+            ("a gap", schedule(2, 3, &PLACES)),
+            ("less than is granted", schedule(2, 0, &PLACES[..1])),
+            ("elsewhere", schedule(2, 1, &[[3.0, 2.0], [4.0, 1.0]])),
+        ];
+        for (what, plan) in plans {
+            let mut bench = scheduled();
+            ask(&mut bench, &PLACES[..2]);
+            bench.step();
+            bench.schedule = Some(plan);
+            bench.steps(3);
+            assert_eq!(bench.header().schedule_version, 1, "{what}");
+            assert_eq!(refused(&bench), 1, "{what}");
+            // The next that does is taken.
+            bench.schedule = Some(schedule(3, 1, &[PLACES[1], [3.0, 2.0]]));
+            bench.step();
+            assert_eq!(bench.header().schedule_version, 3, "{what}");
+        }
+        let mut bench = scheduled();
+        let mut plan = schedule(2, 0, &PLACES);
+        plan.actions[1].object = 9;
+        bench.schedule = Some(plan);
+        bench.steps(3);
+        assert_eq!((bench.header().schedule_version, refused(&bench)), (1, 1));
+    }
+
+    /// Robot 1 stands in the way of the second action.
+    fn partly_granted() -> Bench {
+        let mut bench = bench();
+        bench.schedule = Some(schedule(1, 0, &[[3.0, 1.0], [8.0, 1.0]]));
+        bench.step();
+        ask(&mut bench, &[[3.0, 1.0], [8.0, 1.0]]);
+        bench.step();
+        let robot = bench.robot(0);
+        assert_eq!((robot.actions, robot.grant_count), (1, 2));
+        bench
+    }
+
+    #[test]
+    fn what_is_not_granted_is_dropped_when_a_schedule_comes_into_force() {
+        let mut bench = partly_granted();
+        bench.schedule = Some(schedule(2, 1, &[[3.0, 2.0]]));
+        bench.steps(2);
+        assert_eq!(refused(&bench), 1, "half of the second action is granted");
+        bench.schedule = Some(schedule(3, 1, &[[8.0, 1.0], [8.0, 3.0]]));
+        bench.step();
+        assert_eq!(bench.header().schedule_version, 3);
+        let robot = bench.robot(0);
+        assert_eq!(
+            (robot.actions, robot.grant_count, robot.request_open),
+            (1, 1, 0)
+        );
+        bench.steps(600);
+        assert_eq!(bench.at(0), [3.0, 1.0], "and no further");
+    }
+
+    #[test]
+    fn a_restarted_robot_keeps_its_grant_and_one_that_is_gone_does_not() {
+        let mut bench = partly_granted();
+        bench.tell(ControlKind::Up, 0, 2);
+        (bench.commands[0].incarnation, bench.commands[0].sequence) = (2, 0);
+        bench.commands[0].path = Default::default();
+        bench.step();
+        assert_eq!((bench.robot(0).actions, bench.robot(0).grant_count), (1, 1));
+        bench.tell(ControlKind::Down, 0, 2);
+        bench.step();
+        assert_eq!((bench.robot(0).actions, bench.robot(0).grant_count), (0, 0));
+    }
+
+    #[test]
+    fn an_object_that_needs_no_transport_is_claimed_and_given_back_as_it_was() {
+        let mut bench = bench();
+        for (task, status) in [(1, TaskStatus::Done), (0, TaskStatus::Waiting)] {
+            bench.claim(1, task);
+            bench.step();
+            let object = bench.object(task as usize);
+            assert_eq!(object.status, TaskStatus::Claimed.code());
+            bench.commands[1].claim.task = NONE;
+            bench.step();
+            assert_eq!(bench.object(task as usize).status, status.code());
+        }
+        assert_eq!(bench.world.counters().invalid_claims, 0);
+        bench.claim(1, 1);
+        bench.step();
+        bench.grasp(1);
+        bench.release(1);
+        let object = bench.object(1);
+        assert_eq!(
+            (object.put_downs, object.status),
+            (1, TaskStatus::Done.code())
+        );
+    }
+
+    #[test]
+    fn a_claim_refused_is_judged_again_and_counted_once() {
+        let mut bench = bench();
+        bench.claim(0, 0);
+        bench.claim(1, 0);
+        bench.steps(3);
+        assert_eq!(bench.world.counters().selection_conflicts, 1);
+        bench.commands[0].claim.task = NONE;
+        bench.step();
+        assert_eq!(bench.robot(1).task, 0);
+    }
+
+    #[test]
+    fn who_waits_for_a_schedule_takes_no_computer() {
+        let mut bench = bench();
+        for command in &mut bench.commands {
+            command.activity = shm_types::Activity::Computing.code();
+        }
+        bench.step();
+        assert_eq!(bench.header().busy, 0);
+    }
+
+    #[test]
+    fn a_planner_that_has_given_up_says_why_the_run_is_stuck() {
+        for (verdict, words) in [
+            (
+                Verdict::NotFound,
+                "found no plan within its limits; 1 tasks wait",
+            ),
+            (Verdict::Exhausted, "no plan exists on this lattice"),
+        ] {
+            let mut bench = bench();
+            bench.step();
+            bench.planner.verdict = verdict.code();
+            bench.planner.schedule_version = 1;
+            for _ in 0..5 {
+                (0..2).for_each(|robot| bench.settle(robot));
+                bench.step();
+            }
+            assert_eq!(bench.world.outcome(), Outcome::Running, "one is on its way");
+            bench.planner.schedule_version = 0;
+            for _ in 0..2 {
+                (0..2).for_each(|robot| bench.settle(robot));
+                bench.step();
+            }
+            assert_eq!(bench.world.outcome(), Outcome::Stuck);
+            assert_eq!(bench.world.verdict(), verdict);
+            let reason = bench.world.reason(&bench.scene).unwrap();
+            assert!(reason.contains(words), "{reason}");
+        }
+    }
+}

@@ -218,6 +218,15 @@ impl Story {
         }
     }
 
+    /// How a task stood before it was claimed: one that is done may be claimed, to be moved for
+    /// others' sake.
+    fn status_before(&self, task: usize) -> TaskStatus {
+        let before = self.objects[task].doing.iter().rev();
+        let unclaimed = before.map(|(_, doing)| doing.status);
+        let mut unclaimed = unclaimed.filter(|status| *status != TaskStatus::Claimed);
+        unclaimed.next().unwrap_or(TaskStatus::Waiting)
+    }
+
     /// What is known the instant it happens, before the next state shows it.
     fn event(&mut self, event: Event) {
         let task = match event.what {
@@ -225,7 +234,7 @@ impl Story {
                 Some((task, TaskStatus::Claimed, Some(robot)))
             }
             Happening::Grasped { robot, task } => Some((task, TaskStatus::Held, Some(robot))),
-            Happening::Unclaimed { task, .. } => Some((task, TaskStatus::Waiting, None)),
+            Happening::Unclaimed { task, .. } => Some((task, self.status_before(task), None)),
             Happening::Completed { task } => Some((task, TaskStatus::Done, None)),
             _ => None,
         };
