@@ -16,6 +16,7 @@
 //! (rule 13).
 #![forbid(unsafe_code)]
 
+mod anytime;
 mod assignment;
 mod bounds;
 mod certificate;

@@ -1,0 +1,280 @@
+//! The room as the planner of schedules sees it: bodies on the lattice, and when two of them
+//! would meet.
+//!
+//! Responsible for: which steps the walls leave to each class of bodies, which offsets between two
+//! bodies mean overlap, distances to a place with the walls alone, the unit of time.
+//! Not responsible for: who is where when (`timeline`).
+//!
+//! Terms: a *mask* is the set of offsets, in lattice steps, at which a body of one class overlaps
+//! one of another. Times are whole units of [`STRAIGHT`] a straight step.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use scene::{
+    Body, Budget, ClassId, Occupancy, ROBOT_ALONE, Scene, Settings, Shape, Vec2, overlap,
+};
+use shm_types::Counters;
+
+use crate::field::DistanceField;
+use crate::frontier::{DIAGONAL, STRAIGHT};
+
+/// A time, in units of which a straight step takes [`STRAIGHT`].
+pub(crate) type Time = u32;
+/// After all.
+pub(crate) const EVER: Time = Time::MAX;
+
+/// The directions of [`Occupancy::steps`], as columns and rows.
+pub(crate) const DIRECTIONS: [(i32, i32); 8] = [
+    (1, 0),
+    (0, 1),
+    (-1, 0),
+    (0, -1),
+    (1, 1),
+    (-1, 1),
+    (-1, -1),
+    (1, -1),
+];
+
+/// Ticks that a grip takes beyond its own duration, from standing there to going on: the command,
+/// the snapshot that shows it held, the next request.
+const TICKS_PER_GRIP: f64 = 2.0;
+
+/// An offset in lattice steps.
+pub(crate) type Offset = (i32, i32);
+
+/// Offsets from a body of one class at which one of another overlaps it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Mask {
+    pub(crate) all: Vec<Offset>,
+    /// For each direction: offsets from the end of a step that were none from its start.
+    pub(crate) entered: [Vec<Offset>; 8],
+    /// For each direction: offsets from the start of a step that are none from its end.
+    pub(crate) left: [Vec<Offset>; 8],
+    /// For each diagonal: offsets from the start, of what is swept on the way only.
+    pub(crate) swept: [Vec<Offset>; 8],
+}
+
+/// Distances to one place, walls only: of each lattice point the time plus one, 0 where there is
+/// no way.
+pub(crate) type Field = Arc<[u32]>;
+
+/// The static part of what is planned with.
+pub(crate) struct Ground {
+    pub(crate) width: i32,
+    pub(crate) height: i32,
+    pub(crate) classes: usize,
+    walls: Vec<Occupancy>,
+    /// By class that is kept away, then class that is there.
+    masks: Vec<Mask>,
+    fields: HashMap<(usize, u32), Field>,
+    flood: DistanceField,
+    pub(crate) offsets: [i32; 8],
+    /// Class of a robot that carries each object.
+    pub(crate) carrying: Vec<usize>,
+    /// Seconds in a unit of time.
+    pub(crate) second_per_unit: f64,
+    /// Time in a tick, at least 1.
+    pub(crate) tick: Time,
+    pub(crate) grasp: Time,
+    pub(crate) release: Time,
+    pub(crate) counters: Counters,
+}
+
+impl Ground {
+    pub(crate) fn new(scene: &Scene, settings: &Settings) -> Self {
+        let classes = scene.class_count();
+        let walls: Vec<Occupancy> = (0..classes)
+            .map(|class| {
+                let mut walls = Occupancy::new(scene);
+                walls.reset(scene, ClassId(class));
+                walls
+            })
+            .collect();
+        let second_per_unit =
+            scene.lattice.pitch_m / scene.robot.speed_m_per_s / f64::from(STRAIGHT);
+        let tick_s = settings.tick_ns as f64 * 1e-9;
+        let units = |ns: u64| {
+            let ticks = (ns as f64 / settings.tick_ns as f64).ceil() + TICKS_PER_GRIP;
+            (ticks * tick_s / second_per_unit).ceil() as Time
+        };
+        let masks = (0..classes * classes)
+            .map(|pair| {
+                let (kept, there) = (pair / classes, pair % classes);
+                let pitch_m = scene.lattice.pitch_m;
+                let body = |class| scene.body(ClassId(class));
+                Mask::of(body(kept), body(there), pitch_m)
+            })
+            .collect();
+        Self {
+            width: scene.lattice.width as i32,
+            height: scene.lattice.height as i32,
+            classes,
+            offsets: walls[ROBOT_ALONE.0].offsets(),
+            carrying: scene.objects.iter().map(|object| object.class.0).collect(),
+            walls,
+            masks,
+            fields: HashMap::new(),
+            flood: DistanceField::new(scene),
+            second_per_unit,
+            tick: ((tick_s / second_per_unit).ceil() as Time).max(1),
+            grasp: units(scene.robot.grasp_ns),
+            release: units(scene.robot.release_ns),
+            counters: Counters::default(),
+        }
+    }
+
+    pub(crate) fn points(&self) -> usize {
+        (self.width * self.height) as usize
+    }
+
+    /// Where a class of bodies can be among the walls alone.
+    #[inline]
+    pub(crate) fn walls(&self, class: usize) -> &Occupancy {
+        &self.walls[class]
+    }
+
+    /// What a body of class `there` keeps one of class `kept` away from.
+    #[inline]
+    pub(crate) fn mask(&self, kept: usize, there: usize) -> &Mask {
+        &self.masks[kept * self.classes + there]
+    }
+
+    /// Whether two bodies overlap.
+    pub(crate) fn meet(&self, kept: usize, at: u32, there: usize, other: u32) -> bool {
+        let (a, b) = (self.xy(at), self.xy(other));
+        let offset = (a.0 - b.0, a.1 - b.1);
+        self.mask(kept, there).all.contains(&offset)
+    }
+
+    #[inline]
+    pub(crate) fn xy(&self, cell: u32) -> Offset {
+        (cell as i32 % self.width, cell as i32 / self.width)
+    }
+
+    /// The cell at an offset from another, if it is on the lattice.
+    #[inline]
+    pub(crate) fn moved(&self, (x, y): Offset, (dx, dy): Offset) -> Option<u32> {
+        let (x, y) = (x + dx, y + dy);
+        ((0..self.width).contains(&x) && (0..self.height).contains(&y))
+            .then(|| (y * self.width + x) as u32)
+    }
+
+    /// Cells at which a body of class `kept` would overlap a shape that stands at `at`; with or
+    /// without the body's clearance.
+    pub(crate) fn around(
+        &self,
+        scene: &Scene,
+        kept: usize,
+        shape: &Shape,
+        at: Vec2,
+        clearance: bool,
+    ) -> Vec<u32> {
+        let body = scene.body(ClassId(kept));
+        let reach_m = reach_of(body) + shape_reach(shape);
+        let lattice = &scene.lattice;
+        let index = |m: f64, origin: f64, count: i32| {
+            ((m - origin) / lattice.pitch_m).clamp(0.0, f64::from(count - 1))
+        };
+        let x0 = index(at.x - reach_m, lattice.origin.x, self.width).floor() as i32;
+        let x1 = index(at.x + reach_m, lattice.origin.x, self.width).ceil() as i32;
+        let y0 = index(at.y - reach_m, lattice.origin.y, self.height).floor() as i32;
+        let y1 = index(at.y + reach_m, lattice.origin.y, self.height).ceil() as i32;
+        let mut cells = Vec::new();
+        for y in y0..=y1 {
+            for x in x0..=x1 {
+                let cell = (y * self.width + x) as u32;
+                if body.overlaps(lattice.at(cell), clearance, shape, at) {
+                    cells.push(cell);
+                }
+            }
+        }
+        cells
+    }
+
+    /// Distances to `to` for a class of bodies, walls only; worked out once.
+    pub(crate) fn field(&mut self, scene: &Scene, class: usize, to: u32) -> Field {
+        if let Some(field) = self.fields.get(&(class, to)) {
+            return Arc::clone(field);
+        }
+        self.flood.occupancy().reset(scene, ClassId(class));
+        self.flood.begin(scene, scene.lattice.at(to));
+        let mut budget = Budget::new(u64::MAX);
+        let done = self.flood.advance(&mut budget, &mut self.counters);
+        debug_assert!(done.is_ready());
+        let mut costs = vec![0; self.points()];
+        self.flood.keep(&mut costs);
+        let field: Field = costs.into();
+        self.fields.insert((class, to), Arc::clone(&field));
+        field
+    }
+
+    pub(crate) fn seconds(&self, time: Time) -> f64 {
+        f64::from(time) * self.second_per_unit
+    }
+}
+
+/// How long a step in a direction takes.
+#[inline]
+pub(crate) const fn duration(direction: usize) -> Time {
+    if direction < 4 { STRAIGHT } else { DIAGONAL }
+}
+
+impl Mask {
+    fn of(kept: &Body, there: &Body, pitch_m: f64) -> Self {
+        let steps = ((reach_of(kept) + reach_of(there)) / pitch_m).ceil() as i32;
+        let side = 2 * steps + 1;
+        let mut inside = vec![false; (side * side) as usize];
+        let mut all = Vec::new();
+        for dy in -steps..=steps {
+            for dx in -steps..=steps {
+                let offset = Vec2::new(f64::from(dx), f64::from(dy)) * pitch_m;
+                let meets = kept.parts.iter().any(|part| {
+                    there.parts.iter().any(|other| {
+                        overlap(&part.grown, offset + part.offset, &other.bare, other.offset)
+                    })
+                });
+                if meets {
+                    inside[((dy + steps) * side + dx + steps) as usize] = true;
+                    all.push((dx, dy));
+                }
+            }
+        }
+        let has = |(dx, dy): Offset| {
+            dx.abs() <= steps
+                && dy.abs() <= steps
+                && inside[((dy + steps) * side + dx + steps) as usize]
+        };
+        let mut mask = Self::default();
+        for (direction, &(sx, sy)) in DIRECTIONS.iter().enumerate() {
+            // An offset from the start is one less the step from the end.
+            let entered = all.iter().filter(|(dx, dy)| !has((dx + sx, dy + sy)));
+            mask.entered[direction] = entered.copied().collect();
+            let left = all.iter().filter(|(dx, dy)| !has((dx - sx, dy - sy)));
+            mask.left[direction] = left.copied().collect();
+            if sx != 0 && sy != 0 {
+                let mut swept: Vec<Offset> = all
+                    .iter()
+                    .flat_map(|(dx, dy)| [(dx + sx, *dy), (*dx, dy + sy)])
+                    .filter(|&(dx, dy)| !has((dx, dy)) && !has((dx - sx, dy - sy)))
+                    .collect();
+                swept.sort_unstable();
+                swept.dedup();
+                mask.swept[direction] = swept;
+            }
+        }
+        mask.all = all;
+        mask
+    }
+}
+
+/// How far a body reaches from the robot's centre along an axis at most, m.
+fn reach_of(body: &Body) -> f64 {
+    let reach = |part: &scene::Part| part.offset.amax() + shape_reach(&part.grown);
+    body.parts.iter().map(reach).fold(0.0, f64::max)
+}
+
+fn shape_reach(shape: &Shape) -> f64 {
+    let (low, high) = shape.extent();
+    low.amax().max(high.amax())
+}

@@ -1,0 +1,279 @@
+//! Who moves what, in which order.
+//!
+//! Responsible for: the moves of a sequence, lengths with the walls alone, what has to come before
+//! what, how long an order takes at least, orders near another one.
+//! Not responsible for: whether an order can be carried out, and how long that takes (`plan`).
+//!
+//! Terms: an *order* lists moves as they are committed. What has to be gone before something else
+//! can pass comes first in it; robots move at the same time all the same.
+
+use std::rc::Rc;
+
+use scene::{ClassId, Pieces, ROBOT_ALONE, Scene};
+use shm_types::capacity::MAX_ROBOTS;
+
+use crate::anytime::ground::{EVER, Ground, Time};
+use crate::anytime::plan::{Place, Start};
+use crate::anytime::sequence::Step;
+
+/// An item of an order: an object, and the robot that moves it. An object that is moved several
+/// times goes through its places in turn.
+pub(crate) type Item = (u32, u32);
+
+/// A move of one object from one of its places to the next.
+#[derive(Clone, Debug)]
+pub(crate) struct Hop {
+    pub(crate) object: usize,
+    pub(crate) from: Rc<Place>,
+    pub(crate) to: Rc<Place>,
+}
+
+/// The moves that have to be made, and what is known of them.
+pub(crate) struct Hops {
+    /// By object, its moves one after the other.
+    pub(crate) list: Vec<Hop>,
+    /// By object: its first move in the list, and the end of its moves.
+    pub(crate) of: Vec<(usize, usize)>,
+    /// By robot and move: from where the robot starts to the grasp.
+    approach: Vec<Vec<Time>>,
+    /// By move and move: from one's release to the other's grasp.
+    between: Vec<Vec<Time>>,
+    /// By move: its transfer and both grips.
+    transfer: Vec<Time>,
+    /// By move and robot: from the release home.
+    back: Vec<Vec<Time>>,
+    /// By move: which moves have to come before it.
+    before: Vec<Vec<usize>>,
+}
+
+impl Hops {
+    /// The moves of a sequence.
+    pub(crate) fn new(
+        scene: &Scene,
+        ground: &mut Ground,
+        start: &Start,
+        homes: &[u32],
+        sequence: &[Step],
+    ) -> Self {
+        let mut list = Vec::new();
+        let mut of = Vec::new();
+        for (object, place) in start.objects.iter().enumerate() {
+            let first = list.len();
+            let mut from = Rc::clone(place);
+            for (_, to) in sequence.iter().filter(|(moved, _)| *moved == object) {
+                list.push(Hop {
+                    object,
+                    from,
+                    to: Rc::clone(to),
+                });
+                from = Rc::clone(to);
+            }
+            of.push((first, list.len()));
+        }
+        let alone = ROBOT_ALONE.0;
+        let read = |field: &[u32], cell: u32| field[cell as usize].checked_sub(1).unwrap_or(EVER);
+        let mut approach = vec![Vec::new(); homes.len()];
+        let mut between = vec![Vec::new(); list.len()];
+        let mut transfer = Vec::new();
+        let mut back = vec![Vec::new(); list.len()];
+        for hop in &list {
+            let field = ground.field(scene, alone, hop.from.grasp);
+            for (robot, &cell) in start.robots.iter().enumerate() {
+                approach[robot].push(read(&field, cell));
+            }
+            for (other, row) in list.iter().zip(&mut between) {
+                row.push(read(&field, other.to.grasp));
+            }
+            let field = ground.field(scene, ground.carrying[hop.object], hop.to.grasp);
+            let way = read(&field, hop.from.grasp);
+            transfer.push(way.saturating_add(ground.grasp + ground.release));
+        }
+        for &home in homes {
+            let field = ground.field(scene, alone, home);
+            for (hop, row) in list.iter().zip(&mut back) {
+                row.push(read(&field, hop.to.grasp));
+            }
+        }
+        let before = precedence(scene, ground, &list, &of, homes, start);
+        Self {
+            list,
+            of,
+            approach,
+            between,
+            transfer,
+            back,
+            before,
+        }
+    }
+
+    /// The moves of an order, in turn: number of the move, and its robot.
+    fn moves_of<'a>(
+        &'a self,
+        order: &'a [Item],
+        next: &'a mut Vec<usize>,
+    ) -> impl Iterator<Item = (usize, usize)> + 'a {
+        next.clear();
+        next.extend(self.of.iter().map(|&(first, _)| first));
+        order.iter().map(move |&(object, robot)| {
+            let number = next[object as usize];
+            next[object as usize] += 1;
+            (number, robot as usize)
+        })
+    }
+
+    /// The least time that an order takes, with the walls alone; none if something in it comes too
+    /// early.
+    pub(crate) fn least(&self, order: &[Item]) -> Option<Time> {
+        let mut last = [usize::MAX; MAX_ROBOTS];
+        let mut busy = [0 as Time; MAX_ROBOTS];
+        let mut done = vec![false; self.list.len()];
+        let mut next = Vec::new();
+        for (hop, robot) in self.moves_of(order, &mut next) {
+            if self.before[hop].iter().any(|&before| !done[before]) {
+                return None;
+            }
+            done[hop] = true;
+            let way = match last[robot] {
+                usize::MAX => self.approach[robot][hop],
+                before => self.between[before][hop],
+            };
+            busy[robot] = busy[robot]
+                .saturating_add(way)
+                .saturating_add(self.transfer[hop]);
+            last[robot] = hop;
+        }
+        let ends = (0..self.approach.len())
+            .filter(|&robot| last[robot] != usize::MAX)
+            .map(|robot| busy[robot].saturating_add(self.back[last[robot]][robot]));
+        Some(ends.max().unwrap_or(0))
+    }
+
+    /// How long robot `robot` is busy if it makes another move after those of an order: the key
+    /// by which a first order is made.
+    pub(crate) fn done_by(&self, order: &[Item], object: usize, robot: usize) -> Option<Time> {
+        let mut longer: Vec<Item> = order.to_vec();
+        longer.push((object as u32, robot as u32));
+        self.least(&longer)?;
+        self.least_of_robot(&longer, robot)
+    }
+
+    fn least_of_robot(&self, order: &[Item], robot: usize) -> Option<Time> {
+        let mut next = Vec::new();
+        let (mut busy, mut last): (Time, Option<usize>) = (0, None);
+        for (hop, by) in self.moves_of(order, &mut next) {
+            if by == robot {
+                let way = match last {
+                    None => self.approach[robot][hop],
+                    Some(before) => self.between[before][hop],
+                };
+                busy = busy.saturating_add(way).saturating_add(self.transfer[hop]);
+                last = Some(hop);
+            }
+        }
+        Some(busy.saturating_add(self.back[last?][robot]))
+    }
+}
+
+/// Which moves have to come before which: single objects that are in the way where they start, or
+/// where they end.
+fn precedence(
+    scene: &Scene,
+    ground: &Ground,
+    list: &[Hop],
+    of: &[(usize, usize)],
+    homes: &[u32],
+    start: &Start,
+) -> Vec<Vec<usize>> {
+    let mut before = vec![Vec::new(); list.len()];
+    for (number, hop) in list.iter().enumerate() {
+        if number > of[hop.object].0 {
+            before[number].push(number - 1);
+        }
+    }
+    for class in 0..ground.classes {
+        let mut pieces = Pieces::new(scene, ClassId(class));
+        let alone = class == ROBOT_ALONE.0;
+        let hinders = |pieces: &Pieces, hop: &Hop| {
+            if alone {
+                let at_home = |cell: u32| {
+                    let piece = pieces.piece(cell);
+                    piece.is_some() && homes.iter().any(|&home| pieces.piece(home) == piece)
+                };
+                !at_home(hop.from.grasp) || !at_home(hop.to.grasp)
+            } else {
+                let piece = pieces.piece(hop.from.grasp);
+                piece.is_none() || piece != pieces.piece(hop.to.grasp)
+            }
+        };
+        let concerned: Vec<usize> = (0..list.len())
+            .filter(|&number| alone || ground.carrying[list[number].object] == class)
+            .filter(|&number| !hinders(&pieces, &list[number]))
+            .collect();
+        for (object, &(first, end)) in of.iter().enumerate() {
+            let spec = &scene.objects[object];
+            if alone && spec.pass_under {
+                continue;
+            }
+            let shape = &spec.shape;
+            let mut note = |at, is_start: bool| {
+                pieces.block(scene, shape, at, true);
+                for &number in &concerned {
+                    if list[number].object == object || !hinders(&pieces, &list[number]) {
+                        continue;
+                    }
+                    if is_start && first < end {
+                        before[number].push(first);
+                    } else if !is_start {
+                        before[end - 1].push(number);
+                    }
+                }
+            };
+            note(start.objects[object].at, true);
+            if first < end {
+                note(list[end - 1].to.at, false);
+            }
+        }
+    }
+    for row in &mut before {
+        row.sort_unstable();
+        row.dedup();
+    }
+    before
+}
+
+/// Numbers that look random and are always the same (`SplitMix64`).
+#[derive(Clone, Debug)]
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn below(&mut self, count: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut word = self.0;
+        word = (word ^ (word >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        word = (word ^ (word >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        word ^= word >> 31;
+        ((u128::from(word) * count as u128) >> 64) as usize
+    }
+}
+
+/// Changes an order a little: moves an item elsewhere, exchanges two, or gives one to another
+/// robot.
+pub(crate) fn change(order: &mut Vec<Item>, robots: usize, random: &mut Random) {
+    let count = order.len();
+    if count == 0 {
+        return;
+    }
+    match random.below(if robots > 1 { 4 } else { 2 }) {
+        0 => {
+            let item = order.remove(random.below(count));
+            order.insert(random.below(count), item);
+        }
+        1 => order.swap(random.below(count), random.below(count)),
+        2 => order[random.below(count)].1 = random.below(robots) as u32,
+        _ => {
+            let mut item = order.remove(random.below(count));
+            item.1 = random.below(robots) as u32;
+            order.insert(random.below(count), item);
+        }
+    }
+}

@@ -1,0 +1,602 @@
+//! A plan in the making: moves committed one after the other, each in space and time against all
+//! that was committed before (rule 31).
+//!
+//! Responsible for: committing a move (approach, grasp, transfer, release, the way home), what that
+//! reserves, taking back a way home that nothing hangs on.
+//! Not responsible for: which move comes next (`order`), searching (`route`).
+//!
+//! Terms: a robot's *tail* is its way home after its last release. Everybody else plans around
+//! it; when the robot gets another move, its tail is taken back first. Whoever is parked is
+//! reserved for ever until its next committed move, so waiting there is always possible.
+
+use std::rc::Rc;
+
+use scene::{ROBOT_ALONE, Scene, Vec2};
+
+use crate::anytime::ground::{EVER, Ground, Time};
+use crate::anytime::route::{Leg, Piece, Quest, Router, Target, Then};
+use crate::anytime::timeline::{Owner, Timeline};
+
+/// A place of one object: at rest there, grasped there.
+#[derive(Clone, Debug)]
+pub(crate) struct Place {
+    /// Centre of the object, m.
+    pub(crate) at: Vec2,
+    /// Where the robot grasps it.
+    pub(crate) grasp: u32,
+    /// Where it keeps each class of bodies away, sorted.
+    pub(crate) cells: Vec<Vec<u32>>,
+    /// Where it keeps a robot that comes for it away, sorted.
+    pub(crate) bare: Vec<u32>,
+}
+
+/// What a robot does, in order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Deed {
+    /// A step in a direction, from when to when.
+    Step(u8, Time, Time),
+    /// It has grasped this object, which was put down so often before.
+    Grasped(u32, u32, Time),
+    /// It has put this object down.
+    Released(u32, Time),
+}
+
+/// What a robot does.
+#[derive(Clone, Debug)]
+pub(crate) struct Track {
+    /// Where it begins.
+    pub(crate) start: u32,
+    pub(crate) deeds: Vec<Deed>,
+    /// Deeds from here on are its tail.
+    tail: usize,
+    /// Where and when the tail begins, and the object that was put down there.
+    free: (u32, Time, Option<usize>),
+    /// Where and when it ends.
+    pub(crate) end: (u32, Time),
+}
+
+/// Where an object is left by the last move of it.
+#[derive(Clone, Debug)]
+struct Rest {
+    place: Rc<Place>,
+    since: Time,
+    /// How often it has been put down.
+    turns: u32,
+}
+
+/// A move: which robot brings which object where.
+#[derive(Clone, Debug)]
+pub(crate) struct Move {
+    pub(crate) robot: usize,
+    pub(crate) object: usize,
+    pub(crate) to: Rc<Place>,
+}
+
+/// The state that a plan starts from.
+#[derive(Clone, Debug)]
+pub(crate) struct Start {
+    /// Cells of the robots, which hold nothing.
+    pub(crate) robots: Vec<u32>,
+    pub(crate) objects: Vec<Rc<Place>>,
+}
+
+/// The plan.
+pub(crate) struct Plan {
+    robots: u32,
+    homes: Vec<u32>,
+    timeline: Timeline,
+    tracks: Vec<Track>,
+    rests: Vec<Rest>,
+    way: Vec<Piece>,
+    /// Plans that take this long or longer are not looked for.
+    limit: Time,
+}
+
+impl Place {
+    /// The place of `object` with its centre at `at`; none if its grasp is off the lattice.
+    pub(crate) fn of(scene: &Scene, ground: &Ground, object: usize, at: Vec2) -> Option<Rc<Self>> {
+        let spec = &scene.objects[object];
+        let grasp = scene.lattice.cell(scene.grasp_at(object, at))?;
+        let open_to_empty = spec.pass_under;
+        let cells = (0..ground.classes)
+            .map(|class| {
+                if class == ROBOT_ALONE.0 && open_to_empty {
+                    return Vec::new();
+                }
+                ground.around(scene, class, &spec.shape, at, true)
+            })
+            .collect();
+        let bare = if open_to_empty || scene.lifts_from_below(object) {
+            Vec::new()
+        } else {
+            ground.around(scene, ROBOT_ALONE.0, &spec.shape, at, false)
+        };
+        Some(Rc::new(Self {
+            at,
+            grasp,
+            cells,
+            bare,
+        }))
+    }
+}
+
+impl Plan {
+    pub(crate) fn new(ground: &Ground, homes: Vec<u32>) -> Self {
+        Self {
+            robots: homes.len() as u32,
+            homes,
+            timeline: Timeline::new(ground),
+            tracks: Vec::new(),
+            rests: Vec::new(),
+            way: Vec::new(),
+            limit: EVER,
+        }
+    }
+
+    /// Nothing committed: everybody stays where it is.
+    pub(crate) fn begin(&mut self, ground: &Ground, start: &Start, limit: Time) {
+        self.limit = limit;
+        self.timeline.clear();
+        self.tracks.clear();
+        self.rests.clear();
+        for (robot, &cell) in start.robots.iter().enumerate() {
+            let walker = self
+                .timeline
+                .enter(ground, robot as Owner, ROBOT_ALONE.0, cell, 0);
+            self.timeline.leave(ground, &walker, EVER, 0);
+            self.tracks.push(Track {
+                start: cell,
+                deeds: Vec::new(),
+                tail: 0,
+                free: (cell, 0, None),
+                end: (cell, 0),
+            });
+        }
+        for (object, place) in start.objects.iter().enumerate() {
+            let owner = self.robots + object as u32;
+            for (class, cells) in place.cells.iter().enumerate() {
+                self.timeline.occupy(class, cells, owner, 0);
+            }
+            self.rests.push(Rest {
+                place: Rc::clone(place),
+                since: 0,
+                turns: 0,
+            });
+        }
+    }
+
+    pub(crate) fn timeline(&self) -> &Timeline {
+        &self.timeline
+    }
+
+    pub(crate) fn tracks(&self) -> &[Track] {
+        &self.tracks
+    }
+
+    /// Where an object is left.
+    pub(crate) fn place(&self, object: usize) -> &Rc<Place> {
+        &self.rests[object].place
+    }
+
+    /// When the last robot is done.
+    pub(crate) fn makespan(&self) -> Time {
+        self.tracks.iter().map(|track| track.end.1).max().unwrap_or(0)
+    }
+
+    /// Whether some robot releases its last object later than `limit`, or at it.
+    pub(crate) fn is_past(&self, limit: Time) -> bool {
+        self.tracks.iter().any(|track| track.free.1 >= limit)
+    }
+
+    /// Whether a robot ends at home.
+    pub(crate) fn ends_at_home(&self, robot: usize) -> bool {
+        self.tracks[robot].end.0 == self.homes[robot]
+    }
+
+    /// Commits a move; when it is done with the release, or `None` if there is no way. Then
+    /// nothing has changed.
+    pub(crate) fn commit(
+        &mut self,
+        ground: &mut Ground,
+        router: &mut Router,
+        scene: &Scene,
+        wanted: &Move,
+    ) -> Option<Time> {
+        let robot = wanted.robot;
+        let tail = self.take_tail(ground, robot);
+        let found = self.try_from(ground, router, scene, wanted);
+        if found.is_none() {
+            self.put_tail_back(ground, robot, tail);
+            // From the end of the tail, then.
+            if self.tracks[robot].deeds.len() > self.tracks[robot].tail {
+                let track = &mut self.tracks[robot];
+                let before = (track.tail, track.free);
+                track.tail = track.deeds.len();
+                track.free = (track.end.0, track.end.1, None);
+                let found = self.try_from(ground, router, scene, wanted);
+                if found.is_none() {
+                    let track = &mut self.tracks[robot];
+                    (track.tail, track.free) = before;
+                }
+                return found;
+            }
+        }
+        found
+    }
+
+    fn try_from(
+        &mut self,
+        ground: &mut Ground,
+        router: &mut Router,
+        scene: &Scene,
+        wanted: &Move,
+    ) -> Option<Time> {
+        let clear = self.clear_from(ground, wanted.robot, &wanted.to).ok()?;
+        let mut legs = self.legs(ground, scene, wanted, clear);
+        let mut way = std::mem::take(&mut self.way);
+        let mut found = router.find(
+            ground,
+            &self.timeline,
+            &self.quest(wanted, &legs, 0),
+            &mut way,
+        );
+        if found.is_none() && self.limit == EVER {
+            legs[2].target = Target::Anywhere(None);
+            let quest = self.quest(wanted, &legs, 0);
+            found = router.find(ground, &self.timeline, &quest, &mut way);
+        }
+        let done = found.map(|_| self.enter_way(ground, wanted.robot, &way, Some(wanted)));
+        self.way = way;
+        done
+    }
+
+    /// The legs of a move that begins where the robot's tail does; its object is put down no
+    /// earlier than `clear`.
+    fn legs(&self, ground: &mut Ground, scene: &Scene, wanted: &Move, clear: Time) -> [Leg; 3] {
+        let (_, _, left) = self.tracks[wanted.robot].free;
+        let (moved, nobody) = (self.owner(Some(wanted.object)), self.owner(None));
+        let rest = &self.rests[wanted.object];
+        let (alone, carrying) = (ROBOT_ALONE.0, ground.carrying[wanted.object]);
+        let mut to = |class: usize, cell: u32| Target::Place(cell, ground.field(scene, class, cell));
+        [
+            Leg {
+                class: alone,
+                target: to(alone, rest.place.grasp),
+                then: Then::Grasp(rest.since),
+                closed: self.closed_by(&[Some(wanted.object), left]),
+                own: [moved, self.owner(left)],
+            },
+            Leg {
+                class: carrying,
+                target: to(carrying, wanted.to.grasp),
+                then: Then::Release(clear),
+                closed: Vec::new(),
+                own: [moved, nobody],
+            },
+            Leg {
+                class: alone,
+                target: to(alone, self.homes[wanted.robot]),
+                then: Then::Stay,
+                closed: wanted.to.bare.clone(),
+                own: [moved, nobody],
+            },
+        ]
+    }
+
+    fn quest<'a>(&self, wanted: &Move, legs: &'a [Leg], ignoring_parked: Owner) -> Quest<'a> {
+        let (from, time, _) = self.tracks[wanted.robot].free;
+        Quest {
+            robot: wanted.robot as Owner,
+            from,
+            time,
+            legs,
+            limit: self.limit,
+            ignoring_parked,
+        }
+    }
+
+    /// As [`Self::commit`]; if parked robots are in the way, they go elsewhere first.
+    pub(crate) fn commit_making_room(
+        &mut self,
+        ground: &mut Ground,
+        router: &mut Router,
+        scene: &Scene,
+        wanted: &Move,
+    ) -> Option<Time> {
+        for _ in 0..2 * self.tracks.len() {
+            if let Some(done) = self.commit(ground, router, scene, wanted) {
+                return Some(done);
+            }
+            let tail = self.take_tail(ground, wanted.robot);
+            let clear = self.clear_from(ground, wanted.robot, &wanted.to);
+            let mut legs = self.legs(ground, scene, wanted, clear.unwrap_or(0));
+            // Where it goes then is another matter.
+            legs[2].target = Target::Anywhere(None);
+            let mut way = std::mem::take(&mut self.way);
+            let quest = self.quest(wanted, &legs, self.robots);
+            let found = router.find(ground, &self.timeline, &quest, &mut way);
+            let bodies = self.bodies(ground, wanted, &way);
+            self.way = way;
+            self.put_tail_back(ground, wanted.robot, tail);
+            found?;
+            let in_the_way = (0..self.tracks.len()).find(|&other| {
+                let end = self.tracks[other].end.0;
+                let meets = |&(cell, class): &(u32, usize)| ground.meet(class, cell, 0, end);
+                other != wanted.robot && (clear == Err(other) || bodies.iter().any(meets))
+            })?;
+            self.make_room(ground, router, in_the_way, &bodies, &wanted.to)?;
+        }
+        None
+    }
+
+    /// Where a way leads, and as which class.
+    fn bodies(&self, ground: &Ground, wanted: &Move, way: &[Piece]) -> Vec<(u32, usize)> {
+        let (mut cell, _, _) = self.tracks[wanted.robot].free;
+        let mut class = ROBOT_ALONE.0;
+        let mut bodies = vec![(cell, class)];
+        for piece in way {
+            match *piece {
+                Piece::Step(direction, ..) => {
+                    cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
+                }
+                Piece::Grip(_) if class == ROBOT_ALONE.0 => {
+                    class = ground.carrying[wanted.object];
+                }
+                Piece::Grip(_) => class = ROBOT_ALONE.0,
+            }
+            bodies.push((cell, class));
+        }
+        bodies
+    }
+
+    /// Sends a parked robot to the nearest place that is in nobody's way and off these bodies'.
+    fn make_room(
+        &mut self,
+        ground: &Ground,
+        router: &mut Router,
+        robot: usize,
+        bodies: &[(u32, usize)],
+        place: &Place,
+    ) -> Option<Time> {
+        let mut marks = vec![0; ground.points()];
+        for &(cell, class) in bodies {
+            let at = ground.xy(cell);
+            for &offset in &ground.mask(ROBOT_ALONE.0, class).all {
+                if let Some(near) = ground.moved(at, offset) {
+                    marks[near as usize] = 1;
+                }
+            }
+        }
+        for &cell in place.cells[ROBOT_ALONE.0].iter().chain(&place.bare) {
+            marks[cell as usize] = 1;
+        }
+        self.go(ground, router, robot, Target::Anywhere(Some(marks.into())))
+    }
+
+    /// Sends a robot that has no move left to a target, to stay.
+    fn go(
+        &mut self,
+        ground: &Ground,
+        router: &mut Router,
+        robot: usize,
+        target: Target,
+    ) -> Option<Time> {
+        let tail = self.take_tail(ground, robot);
+        let (from, time, left) = self.tracks[robot].free;
+        let legs = [Leg {
+            class: ROBOT_ALONE.0,
+            target,
+            then: Then::Stay,
+            closed: self.closed_by(&[left]),
+            own: [self.owner(left), self.owner(None)],
+        }];
+        let quest = Quest {
+            robot: robot as Owner,
+            from,
+            time,
+            legs: &legs,
+            limit: EVER,
+            ignoring_parked: 0,
+        };
+        let mut way = std::mem::take(&mut self.way);
+        let found = router.find(ground, &self.timeline, &quest, &mut way);
+        if found.is_some() {
+            self.enter_way(ground, robot, &way, None);
+        } else {
+            self.put_tail_back(ground, robot, tail);
+        }
+        self.way = way;
+        found
+    }
+
+    /// Sends everybody home who is not to end there.
+    pub(crate) fn send_all_home(
+        &mut self,
+        ground: &mut Ground,
+        router: &mut Router,
+        scene: &Scene,
+    ) -> Option<Time> {
+        let mut progress = true;
+        while progress {
+            progress = false;
+            let mut away = false;
+            for robot in 0..self.tracks.len() {
+                if self.ends_at_home(robot) {
+                    continue;
+                }
+                let home = self.homes[robot];
+                let target = Target::Place(home, ground.field(scene, ROBOT_ALONE.0, home));
+                let gone = self.go(ground, router, robot, target).is_some();
+                progress |= gone;
+                away |= !gone;
+            }
+            if !away {
+                return Some(self.makespan());
+            }
+        }
+        None
+    }
+
+    fn owner(&self, object: Option<usize>) -> Owner {
+        object.map_or(Owner::MAX, |object| self.robots + object as u32)
+    }
+
+    /// Cells that a robot may not enter for objects whose reservations are looked at apart.
+    fn closed_by(&self, objects: &[Option<usize>]) -> Vec<u32> {
+        let mut closed: Vec<u32> = objects
+            .iter()
+            .flatten()
+            .flat_map(|&object| self.rests[object].place.bare.iter().copied())
+            .collect();
+        closed.sort_unstable();
+        closed.dedup();
+        closed
+    }
+
+    /// The earliest time from which an object may stand at a place for ever, or who is parked
+    /// there.
+    fn clear_from(&self, ground: &Ground, mover: usize, place: &Place) -> Result<Time, usize> {
+        let mut clear = 0;
+        for (robot, track) in self.tracks.iter().enumerate() {
+            if robot == mover {
+                continue;
+            }
+            let mut class = ROBOT_ALONE.0;
+            let mut cell = track.start;
+            let meets = |class: usize, cell: u32| place.cells[class].binary_search(&cell).is_ok();
+            let mut was_in = meets(class, cell);
+            for deed in &track.deeds {
+                let until = match *deed {
+                    Deed::Step(direction, _, arrive) => {
+                        cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
+                        arrive
+                    }
+                    Deed::Grasped(object, _, time) => {
+                        class = ground.carrying[object as usize];
+                        time
+                    }
+                    Deed::Released(_, time) => {
+                        class = ROBOT_ALONE.0;
+                        time
+                    }
+                };
+                let is_in = meets(class, cell);
+                if was_in || is_in {
+                    clear = clear.max(until);
+                }
+                was_in = is_in;
+            }
+            if was_in {
+                return Err(robot);
+            }
+        }
+        Ok(clear)
+    }
+
+    /// Takes a robot's tail out of the plan.
+    fn take_tail(&mut self, ground: &Ground, robot: usize) -> Vec<Deed> {
+        let track = &mut self.tracks[robot];
+        let tail = track.deeds.split_off(track.tail);
+        let (cell, time, _) = track.free;
+        let who = (robot as Owner, ROBOT_ALONE.0);
+        let directions = tail.iter().filter_map(Deed::direction);
+        self.timeline
+            .take_back(ground, who, cell, directions, time);
+        tail
+    }
+
+    fn put_tail_back(&mut self, ground: &Ground, robot: usize, tail: Vec<Deed>) {
+        let track = &mut self.tracks[robot];
+        let (cell, time, _) = track.free;
+        let owner = robot as Owner;
+        let mut walker = self
+            .timeline
+            .enter(ground, owner, ROBOT_ALONE.0, cell, time);
+        for deed in tail {
+            if let Deed::Step(direction, depart, arrive) = deed {
+                let number = track.deeds.len() as u32;
+                let span = (depart, arrive);
+                self.timeline
+                    .step(ground, &mut walker, direction as usize, span, number);
+            }
+            track.deeds.push(deed);
+        }
+        let number = track.deeds.len() as u32;
+        self.timeline.leave(ground, &walker, EVER, number);
+    }
+
+    /// Commits a way that was found: of a move (with its class while carrying), or just a way.
+    /// When its object is released, or else when it ends.
+    fn enter_way(&mut self, ground: &Ground, robot: usize, way: &[Piece], wanted: Option<&Move>) -> Time {
+        let owner = robot as Owner;
+        let track = &mut self.tracks[robot];
+        let (mut cell, begin, left) = track.free;
+        let mut walker = self
+            .timeline
+            .enter(ground, owner, ROBOT_ALONE.0, cell, begin);
+        let mut now = begin;
+        let mut holds = false;
+        if wanted.is_none() {
+            track.tail = track.deeds.len();
+            track.free = (cell, begin, left);
+        }
+        for piece in way {
+            let number = track.deeds.len() as u32;
+            match *piece {
+                Piece::Step(direction, depart, arrive) => {
+                    let span = (depart, arrive);
+                    self.timeline
+                        .step(ground, &mut walker, direction as usize, span, number);
+                    cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
+                    track.deeds.push(Deed::Step(direction, depart, arrive));
+                    now = arrive;
+                }
+                Piece::Grip(end) => {
+                    let Some(wanted) = wanted else { continue };
+                    let object = wanted.object;
+                    let id = self.robots + object as u32;
+                    let rest = &mut self.rests[object];
+                    if holds {
+                        self.timeline.leave(ground, &walker, end, number);
+                        walker = self.timeline.enter(ground, owner, ROBOT_ALONE.0, cell, end);
+                        let down = end - ground.release;
+                        for (class, cells) in wanted.to.cells.iter().enumerate() {
+                            self.timeline.occupy(class, cells, id, down);
+                        }
+                        rest.place = Rc::clone(&wanted.to);
+                        rest.since = end;
+                        rest.turns += 1;
+                        track.deeds.push(Deed::Released(object as u32, end));
+                        track.tail = track.deeds.len();
+                        track.free = (cell, end, Some(object));
+                    } else {
+                        let up = end - ground.grasp;
+                        self.timeline.leave(ground, &walker, up, number);
+                        let class = ground.carrying[object];
+                        walker = self.timeline.enter(ground, owner, class, cell, up);
+                        for (class, cells) in rest.place.cells.iter().enumerate() {
+                            self.timeline.vacate(class, cells, id, up);
+                        }
+                        track.deeds.push(Deed::Grasped(object as u32, rest.turns, end));
+                        holds = true;
+                    }
+                    now = end;
+                }
+            }
+        }
+        let number = track.deeds.len() as u32;
+        self.timeline.leave(ground, &walker, EVER, number);
+        track.end = (cell, now);
+        if wanted.is_some() { track.free.1 } else { now }
+    }
+}
+
+impl Deed {
+    /// Direction of a step.
+    pub(crate) fn direction(&self) -> Option<usize> {
+        match self {
+            Self::Step(direction, _, _) => Some(*direction as usize),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,211 @@
+//! From a plan to the schedule that robots follow.
+//!
+//! Responsible for: joining steps into actions, and which action waits for which.
+//! Not responsible for: the plan (`plan`), following it (crate `robot`).
+//!
+//! How: where two robots need the same space, the plan says who is there first. The later one's
+//! step waits for the step with which the earlier one leaves (an action dependency graph: Hönig
+//! et al., "Persistent and robust execution of MAPF schedules in warehouses", RA-L 2019). Waits are
+//! on granted steps: granted space is kept from all others, so the later robot may then follow as
+//! closely as the world allows. Every wait is for something planned earlier, so waits form no
+//! ring. Steps are joined where nothing is waited for, in either direction.
+
+use scene::{Scene, point};
+use shm_types::{Action, Grip, NONE, Schedule, Wait};
+
+use crate::anytime::ground::Ground;
+use crate::anytime::plan::{Deed, Plan, Track};
+use crate::anytime::route::sides;
+
+/// Most steps in one action.
+const MAX_STEPS: u32 = 20;
+
+/// What one step waits for.
+struct Need {
+    /// The robot's deed that waits.
+    deed: u32,
+    /// Whom it waits for, and that one's deed.
+    robot: u32,
+    until: u32,
+}
+
+/// Actions of one robot, and which one each deed is part of.
+struct Joined {
+    actions: Vec<Action>,
+    /// By deed: how many actions are granted once it is.
+    granted: Vec<u32>,
+    /// By action: its first deed.
+    first: Vec<u32>,
+}
+
+/// Writes all of a plan as the schedule of this version.
+///
+/// None if it has more actions or waits than a message has room for.
+pub(crate) fn write(scene: &Scene, ground: &Ground, plan: &Plan, out: &mut Schedule) -> Option<()> {
+    let needs: Vec<Vec<Need>> = (plan.tracks().iter().enumerate())
+        .map(|(robot, track)| needs_of(ground, plan, robot as u32, track))
+        .collect();
+    let mut waited: Vec<Vec<bool>> = (plan.tracks().iter())
+        .map(|track| vec![false; track.deeds.len() + 1])
+        .collect();
+    for need in needs.iter().flatten() {
+        waited[need.robot as usize][need.until as usize] = true;
+    }
+    let joined: Vec<Joined> = (plan.tracks().iter().enumerate())
+        .map(|(robot, track)| join(scene, ground, track, &needs[robot], &waited[robot]))
+        .collect();
+    let (mut actions, mut waits) = (0, 0);
+    out.robot_count = joined.len() as u32;
+    for (robot, part) in joined.iter().enumerate() {
+        let listed = &mut out.robots[robot];
+        listed.first = 0;
+        listed.count = part.actions.len() as u32;
+        listed.offset = actions as u32;
+        listed.complete = 1;
+        let mut needs = needs[robot].iter().peekable();
+        for (index, action) in part.actions.iter().enumerate() {
+            let slot = out.actions.get_mut(actions)?;
+            *slot = *action;
+            slot.first_wait = waits as u32;
+            let last = part.first.get(index + 1).copied().unwrap_or(u32::MAX);
+            while let Some(need) = needs.next_if(|need| need.deed < last) {
+                let granted = &joined[need.robot as usize].granted;
+                *out.waits.get_mut(waits)? = Wait {
+                    robot: need.robot,
+                    actions: granted[(need.until as usize).min(granted.len() - 1)],
+                };
+                waits += 1;
+            }
+            slot.waits = waits as u32 - slot.first_wait;
+            actions += 1;
+        }
+    }
+    out.action_count = actions as u32;
+    out.wait_count = waits as u32;
+    Some(())
+}
+
+/// Whom each step of a robot waits for: only what the steps before have not waited for already.
+fn needs_of(ground: &Ground, plan: &Plan, robot: u32, track: &Track) -> Vec<Need> {
+    let robots = plan.tracks().len();
+    let mut waited_for = vec![None; robots];
+    let mut needs = Vec::new();
+    let mut class = 0;
+    let mut cell = track.start;
+    for (deed, done) in track.deeds.iter().enumerate() {
+        let (direction, depart) = match *done {
+            Deed::Step(direction, depart, _) => (direction as usize, depart),
+            Deed::Grasped(object, ..) => {
+                class = ground.carrying[object as usize];
+                continue;
+            }
+            Deed::Released(..) => {
+                class = 0;
+                continue;
+            }
+        };
+        let next = cell.wrapping_add_signed(ground.offsets[direction]);
+        let mut look = |class: usize, at: u32| {
+            for busy in plan.timeline().busy(class, at) {
+                let other = busy.owner as usize;
+                if busy.owner != robot && other < robots && busy.to <= depart {
+                    let before: &mut Option<u32> = &mut waited_for[other];
+                    if before.is_none_or(|before| before < busy.step) {
+                        *before = Some(busy.step);
+                        needs.push(Need {
+                            deed: deed as u32,
+                            robot: busy.owner,
+                            until: busy.step,
+                        });
+                    }
+                }
+            }
+        };
+        look(class, next);
+        for side in sides(ground, cell, direction).into_iter().flatten() {
+            look(class, side);
+        }
+        if let Some(Deed::Grasped(object, ..)) = track.deeds.get(deed + 1) {
+            look(ground.carrying[*object as usize], next);
+        }
+        cell = next;
+    }
+    needs
+}
+
+fn join(scene: &Scene, ground: &Ground, track: &Track, needs: &[Need], waited: &[bool]) -> Joined {
+    let mut joined = Joined {
+        actions: Vec::new(),
+        granted: Vec::new(),
+        first: Vec::new(),
+    };
+    let mut needs = needs.iter().peekable();
+    let mut cell = track.start;
+    let mut steps = 0;
+    let mut heading = None;
+    for (deed, done) in track.deeds.iter().enumerate() {
+        let mut waits = false;
+        while needs.next_if(|need| need.deed as usize == deed).is_some() {
+            waits = true;
+        }
+        match *done {
+            Deed::Step(direction, ..) => {
+                cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
+                let to = point(scene.lattice.at(cell));
+                let goes_on = heading == Some(direction) && !waits && steps < MAX_STEPS;
+                match joined.actions.last_mut() {
+                    Some(action) if goes_on => {
+                        action.to = to;
+                        steps += 1;
+                    }
+                    _ => {
+                        joined.begin(deed, to);
+                        steps = 1;
+                    }
+                }
+                heading = Some(direction);
+            }
+            Deed::Grasped(object, turn, _) => {
+                joined.grip(deed, scene, cell, Grip::Grasp, object, turn);
+                heading = None;
+            }
+            Deed::Released(object, _) => {
+                joined.grip(deed, scene, cell, Grip::Release, object, 0);
+                heading = None;
+            }
+        }
+        if waited[deed] {
+            heading = None;
+        }
+        joined.granted.push(joined.actions.len() as u32);
+    }
+    joined.granted.push(joined.actions.len() as u32);
+    joined
+}
+
+impl Joined {
+    fn begin(&mut self, deed: usize, to: shm_types::Point) {
+        self.first.push(deed as u32);
+        self.actions.push(Action {
+            to,
+            grip: Grip::Keep.code(),
+            object: NONE,
+            turn: 0,
+            first_wait: 0,
+            waits: 0,
+            reserved: 0,
+        });
+    }
+
+    /// The grip at the end of the last action, or, if there is none or it grips already, of one
+    /// without motion.
+    fn grip(&mut self, deed: usize, scene: &Scene, cell: u32, grip: Grip, object: u32, turn: u32) {
+        let keeps = |action: &&mut Action| action.grip == Grip::Keep.code();
+        if self.actions.last_mut().filter(keeps).is_none() {
+            self.begin(deed, point(scene.lattice.at(cell)));
+        }
+        if let Some(action) = self.actions.last_mut() {
+            (action.grip, action.object, action.turn) = (grip.code(), object, turn);
+        }
+    }
+}

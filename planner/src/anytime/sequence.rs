@@ -1,0 +1,424 @@
+//! In which order objects can move at all, one after the other, and which of them have to wait
+//! somewhere in between.
+//!
+//! Responsible for: a list of moves, each of which has an approach from a home, a transfer and a way
+//! back home among all other objects as they stand then; intermediate places.
+//! Not responsible for: robots in each other's way, time (`plan`).
+//!
+//! How: depth first over arrangements. Whatever can go to its goal goes there. If nothing can, the
+//! cheapest way of an object *through* others (METHOD 29) tells which of these to set aside, and
+//! they go to the nearest place from which they hinder neither that way nor a goal.
+//!
+//! Terms: an *arrangement* says where each object stands.
+
+use std::collections::{HashSet, VecDeque};
+use std::rc::Rc;
+
+use scene::{ROBOT_ALONE, Scene};
+
+use crate::anytime::ground::Ground;
+use crate::anytime::plan::Place;
+
+/// Floods after which no sequence is looked for any more.
+const MOST_FLOODS: u64 = 20_000;
+/// Stuck objects for which others are set aside, in one arrangement.
+const STUCK_LOOKED_AT: usize = 4;
+/// Intermediate places tried for one object in one arrangement.
+const PLACES_TRIED: usize = 3;
+/// Places looked at until that many are found.
+const PLACES_LOOKED_AT: usize = 400;
+/// What a step through an object costs, in steps.
+const PRICE: u32 = 40;
+
+/// A move of a sequence: an object, and where it goes.
+pub(crate) type Step = (usize, Rc<Place>);
+
+/// Looks for sequences.
+pub(crate) struct Sequencer {
+    homes: Vec<u32>,
+    goals: Vec<Option<Rc<Place>>>,
+    /// Blocked in this round, by cell.
+    blocked: Vec<u32>,
+    seen: Vec<u32>,
+    from: Vec<u32>,
+    round: u32,
+    queue: VecDeque<u32>,
+    visited: HashSet<Vec<u32>>,
+    pub(crate) floods: u64,
+    /// Lattice points looked at.
+    pub(crate) cells: u64,
+}
+
+/// What the way of a stuck object would be without those it crosses.
+struct Crossing {
+    crossed: Vec<usize>,
+    /// Cells of the robot on its approach and way back, and of the robot with the object.
+    alone: Vec<u32>,
+    carrying: Vec<u32>,
+}
+
+impl Sequencer {
+    pub(crate) fn new(ground: &Ground, homes: &[u32], goals: &[Option<Rc<Place>>]) -> Self {
+        let points = ground.points();
+        Self {
+            homes: homes.to_vec(),
+            goals: goals.to_vec(),
+            blocked: vec![0; points],
+            seen: vec![0; points],
+            from: vec![0; points],
+            round: 0,
+            queue: VecDeque::new(),
+            visited: HashSet::new(),
+            floods: 0,
+            cells: 0,
+        }
+    }
+
+    /// A sequence that leads from these places to the goals.
+    pub(crate) fn find(
+        &mut self,
+        scene: &Scene,
+        ground: &Ground,
+        start: &[Rc<Place>],
+    ) -> Option<Vec<Step>> {
+        for asides in [0, 1, 2, 4, start.len() + 4] {
+            self.visited.clear();
+            let mut places = start.to_vec();
+            let mut steps = Vec::new();
+            if self.search(scene, ground, &mut places, &mut steps, asides) {
+                return Some(steps);
+            }
+        }
+        None
+    }
+
+    fn search(
+        &mut self,
+        scene: &Scene,
+        ground: &Ground,
+        places: &mut [Rc<Place>],
+        steps: &mut Vec<Step>,
+        asides: usize,
+    ) -> bool {
+        let open: Vec<usize> = (0..places.len())
+            .filter(|&object| !self.is_at_goal(object, places))
+            .collect();
+        if open.is_empty() {
+            return true;
+        }
+        let mut key: Vec<u32> = places.iter().map(|place| place.grasp).collect();
+        key.push(asides as u32);
+        if self.floods > MOST_FLOODS || !self.visited.insert(key) {
+            return false;
+        }
+        for &object in &open {
+            let Some(goal) = self.goals[object].clone() else {
+                continue;
+            };
+            if self.can_move(ground, places, object, &goal) {
+                if self.try_step(scene, ground, places, steps, (object, goal), asides) {
+                    return true;
+                }
+            }
+        }
+        let Some(fewer) = asides.checked_sub(1) else {
+            return false;
+        };
+        for &object in open.iter().take(STUCK_LOOKED_AT) {
+            let Some(crossing) = self.crossing(ground, places, object) else {
+                continue;
+            };
+            for &aside in &crossing.crossed {
+                for place in self.asides(scene, ground, places, object, aside, &crossing) {
+                    if self.try_step(scene, ground, places, steps, (aside, place), fewer) {
+                        return true;
+                    }
+                }
+            }
+        }
+        false
+    }
+
+    fn try_step(
+        &mut self,
+        scene: &Scene,
+        ground: &Ground,
+        places: &mut [Rc<Place>],
+        steps: &mut Vec<Step>,
+        (object, to): Step,
+        asides: usize,
+    ) -> bool {
+        let before = std::mem::replace(&mut places[object], Rc::clone(&to));
+        steps.push((object, to));
+        let done = self.search(scene, ground, places, steps, asides);
+        if !done {
+            places[object] = before;
+            steps.pop();
+        }
+        done
+    }
+
+    fn is_at_goal(&self, object: usize, places: &[Rc<Place>]) -> bool {
+        self.goals[object]
+            .as_ref()
+            .is_none_or(|goal| (goal.at - places[object].at).norm() <= scene::CONTACT_M)
+    }
+
+    /// Whether an object can be fetched, brought there and left, with the others as they are.
+    fn can_move(
+        &mut self,
+        ground: &Ground,
+        places: &[Rc<Place>],
+        object: usize,
+        to: &Place,
+    ) -> bool {
+        let from = &places[object];
+        self.block(ground, places, object, ground.carrying[object]);
+        if !self.reaches(ground, ground.carrying[object], &[from.grasp], &[to.grasp]) {
+            return false;
+        }
+        let homes = std::mem::take(&mut self.homes);
+        let mut works = true;
+        for place in [&**from, to] {
+            self.block(ground, places, object, ROBOT_ALONE.0);
+            self.block_cells(&place.bare);
+            works = works && self.reaches(ground, ROBOT_ALONE.0, &homes, &[place.grasp]);
+        }
+        self.homes = homes;
+        works
+    }
+
+    /// Blocks what all objects but one keep a class away from.
+    fn block(&mut self, _ground: &Ground, places: &[Rc<Place>], except: usize, class: usize) {
+        self.round += 1;
+        for (object, place) in places.iter().enumerate() {
+            if object != except {
+                for &cell in &place.cells[class] {
+                    self.blocked[cell as usize] = self.round;
+                }
+            }
+        }
+    }
+
+    fn block_cells(&mut self, cells: &[u32]) {
+        for &cell in cells {
+            self.blocked[cell as usize] = self.round;
+        }
+    }
+
+    /// Whether any of `to` can be reached from any of `from`, as blocked in this round.
+    fn reaches(&mut self, ground: &Ground, class: usize, from: &[u32], to: &[u32]) -> bool {
+        self.floods += 1;
+        self.queue.clear();
+        for &cell in from {
+            if self.blocked[cell as usize] != self.round && ground.walls(class).is_free(cell) {
+                self.seen[cell as usize] = self.round;
+                self.from[cell as usize] = u32::MAX;
+                self.queue.push_back(cell);
+            }
+        }
+        while let Some(cell) = self.queue.pop_front() {
+            self.cells += 1;
+            if to.contains(&cell) {
+                return true;
+            }
+            let steps = ground.walls(class).steps(cell);
+            for direction in 0..4 {
+                let next = cell.wrapping_add_signed(ground.offsets[direction]);
+                if steps >> direction & 1 == 1
+                    && self.seen[next as usize] != self.round
+                    && self.blocked[next as usize] != self.round
+                {
+                    self.seen[next as usize] = self.round;
+                    self.from[next as usize] = cell;
+                    self.queue.push_back(next);
+                }
+            }
+        }
+        false
+    }
+
+    /// The cheapest way of a stuck object through others.
+    fn crossing(
+        &mut self,
+        ground: &Ground,
+        places: &[Rc<Place>],
+        object: usize,
+    ) -> Option<Crossing> {
+        let goal = self.goals[object].clone()?;
+        let from = Rc::clone(&places[object]);
+        let class = ground.carrying[object];
+        let homes = self.homes.clone();
+        let mut crossed = Vec::new();
+        let carrying =
+            self.cheapest(ground, places, object, class, &[from.grasp], goal.grasp, &mut crossed)?;
+        let alone = ROBOT_ALONE.0;
+        let mut ways =
+            self.cheapest(ground, places, object, alone, &homes, from.grasp, &mut crossed)?;
+        ways.extend(self.cheapest(
+            ground,
+            places,
+            object,
+            alone,
+            &homes,
+            goal.grasp,
+            &mut crossed,
+        )?);
+        crossed.sort_unstable();
+        crossed.dedup();
+        Some(Crossing {
+            crossed,
+            alone: ways,
+            carrying,
+        })
+    }
+
+    /// The way with the least price; objects crossed are added to `crossed`.
+    #[expect(clippy::too_many_arguments, reason = "one search, of one thing")]
+    fn cheapest(
+        &mut self,
+        ground: &Ground,
+        places: &[Rc<Place>],
+        object: usize,
+        class: usize,
+        from: &[u32],
+        to: u32,
+        crossed: &mut Vec<usize>,
+    ) -> Option<Vec<u32>> {
+        self.block(ground, places, object, class);
+        self.floods += 1;
+        let mut best = vec![u32::MAX; ground.points()];
+        let mut open = std::collections::BinaryHeap::new();
+        for &cell in from {
+            if ground.walls(class).is_free(cell) {
+                best[cell as usize] = 0;
+                self.from[cell as usize] = u32::MAX;
+                open.push((std::cmp::Reverse(0), cell));
+            }
+        }
+        while let Some((std::cmp::Reverse(cost), cell)) = open.pop() {
+            if cost > best[cell as usize] {
+                continue;
+            }
+            self.cells += 1;
+            if cell == to {
+                break;
+            }
+            let steps = ground.walls(class).steps(cell);
+            for direction in 0..4 {
+                if steps >> direction & 1 == 0 {
+                    continue;
+                }
+                let next = cell.wrapping_add_signed(ground.offsets[direction]);
+                let price = if self.blocked[next as usize] == self.round {
+                    PRICE
+                } else {
+                    1
+                };
+                if cost + price < best[next as usize] {
+                    best[next as usize] = cost + price;
+                    self.from[next as usize] = cell;
+                    open.push((std::cmp::Reverse(cost + price), next));
+                }
+            }
+        }
+        if best[to as usize] == u32::MAX {
+            return None;
+        }
+        let mut way = vec![to];
+        while self.from[way[way.len() - 1] as usize] != u32::MAX {
+            way.push(self.from[way[way.len() - 1] as usize]);
+        }
+        for (other, place) in places.iter().enumerate() {
+            let meets = |cell: &u32| place.cells[class].binary_search(cell).is_ok();
+            if other != object && way.iter().any(meets) {
+                crossed.push(other);
+            }
+        }
+        Some(way)
+    }
+
+    /// Places to which an object can be set aside, so that it hinders neither a way nor a goal.
+    fn asides(
+        &mut self,
+        scene: &Scene,
+        ground: &Ground,
+        places: &[Rc<Place>],
+        stuck: usize,
+        aside: usize,
+        crossing: &Crossing,
+    ) -> Vec<Rc<Place>> {
+        let class = ground.carrying[aside];
+        let from = Rc::clone(&places[aside]);
+        // Everything it can be brought to, nearest first.
+        self.block(ground, places, aside, class);
+        self.reaches(ground, class, &[from.grasp], &[]);
+        let round = self.round;
+        let mut reached: Vec<u32> = Vec::new();
+        let mut near = VecDeque::from([from.grasp]);
+        let mut listed = vec![false; ground.points()];
+        listed[from.grasp as usize] = true;
+        while let Some(cell) = near.pop_front() {
+            reached.push(cell);
+            for direction in 0..4 {
+                let next = cell.wrapping_add_signed(ground.offsets[direction]);
+                let within = (next as usize) < listed.len();
+                if within && self.seen[next as usize] == round && !listed[next as usize] {
+                    listed[next as usize] = true;
+                    near.push_back(next);
+                }
+            }
+        }
+        let stride = (reached.len() / PLACES_LOOKED_AT).max(1);
+        let mut found = Vec::new();
+        for with_goals in [true, false] {
+            for &cell in reached.iter().step_by(stride) {
+                if found.len() >= PLACES_TRIED || self.floods > MOST_FLOODS {
+                    return found;
+                }
+                let at = scene.lattice.at(cell) - scene.objects[aside].grasp;
+                if let Some(place) = Place::of(scene, ground, aside, at)
+                    && self.is_clear(ground, places, stuck, aside, &place, crossing, with_goals)
+                    && self.can_move(ground, places, aside, &place)
+                {
+                    found.push(place);
+                }
+            }
+            if !found.is_empty() {
+                break;
+            }
+        }
+        found
+    }
+
+    /// Whether an object at a place hinders neither the way of the stuck one nor, if asked, goals.
+    #[expect(clippy::too_many_arguments, reason = "one question")]
+    fn is_clear(
+        &self,
+        ground: &Ground,
+        places: &[Rc<Place>],
+        stuck: usize,
+        aside: usize,
+        place: &Place,
+        crossing: &Crossing,
+        with_goals: bool,
+    ) -> bool {
+        let free = |class: usize, cells: &[u32]| {
+            cells
+                .iter()
+                .all(|cell| place.cells[class].binary_search(cell).is_err())
+        };
+        let ways = free(ground.carrying[stuck], &crossing.carrying)
+            && free(ROBOT_ALONE.0, &crossing.alone)
+            && free(ROBOT_ALONE.0, &self.homes);
+        let goals = !with_goals
+            || (0..places.len()).all(|other| {
+                let class = ground.carrying[other];
+                other == aside
+                    || self.goals[other]
+                        .as_ref()
+                        .is_none_or(|goal| free(class, &[goal.grasp]))
+            });
+        ways && goals
+    }
+}
