@@ -12,7 +12,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use scene::{
-    Body, Budget, ClassId, Occupancy, ROBOT_ALONE, Scene, Settings, Shape, Vec2, overlap,
+    Body, Budget, ClassId, Lattice, Occupancy, ROBOT_ALONE, Scene, Settings, Shape, Vec2, overlap,
 };
 use shm_types::Counters;
 
@@ -53,6 +53,9 @@ pub(crate) struct Mask {
     pub(crate) left: [Vec<Offset>; 8],
     /// For each diagonal: offsets from the start, of what is swept on the way only.
     pub(crate) swept: [Vec<Offset>; 8],
+    /// The set as a square of this half width.
+    inside: Vec<bool>,
+    half: i32,
 }
 
 /// Distances to one place, walls only: of each lattice point the time plus one, 0 where there is
@@ -61,6 +64,7 @@ pub(crate) type Field = Arc<[u32]>;
 
 /// The static part of what is planned with.
 pub(crate) struct Ground {
+    lattice: Lattice,
     pub(crate) width: i32,
     pub(crate) height: i32,
     pub(crate) classes: usize,
@@ -72,6 +76,8 @@ pub(crate) struct Ground {
     pub(crate) offsets: [i32; 8],
     /// Class of a robot that carries each object.
     pub(crate) carrying: Vec<usize>,
+    /// Robot's centre minus object's while grasped, m.
+    pub(crate) grasps: Vec<Vec2>,
     /// Seconds in a unit of time.
     pub(crate) second_per_unit: f64,
     /// Time in a tick, at least 1.
@@ -103,14 +109,23 @@ impl Ground {
                 let (kept, there) = (pair / classes, pair % classes);
                 let pitch_m = scene.lattice.pitch_m;
                 let body = |class| scene.body(ClassId(class));
-                Mask::of(body(kept), body(there), pitch_m)
+                let all = offsets_of(body(kept), body(there), pitch_m);
+                // Where stops lie beside the lattice, bodies are up to a step from where they are
+                // planned to be.
+                Mask::of(if scene.lattice.exact {
+                    all
+                } else {
+                    grown(&all)
+                })
             })
             .collect();
         Self {
+            lattice: scene.lattice.clone(),
             width: scene.lattice.width as i32,
             height: scene.lattice.height as i32,
             classes,
             offsets: walls[ROBOT_ALONE.0].offsets(),
+            grasps: scene.objects.iter().map(|object| object.grasp).collect(),
             carrying: scene.objects.iter().map(|object| object.class.0).collect(),
             walls,
             masks,
@@ -140,11 +155,21 @@ impl Ground {
         &self.masks[kept * self.classes + there]
     }
 
+    /// Where a cell is, m.
+    pub(crate) fn at(&self, cell: u32) -> Vec2 {
+        self.lattice.at(cell)
+    }
+
     /// Whether two bodies overlap.
     pub(crate) fn meet(&self, kept: usize, at: u32, there: usize, other: u32) -> bool {
-        let (a, b) = (self.xy(at), self.xy(other));
-        let offset = (a.0 - b.0, a.1 - b.1);
-        self.mask(kept, there).all.contains(&offset)
+        self.mask(kept, there).has(self.offset(at, other))
+    }
+
+    /// From one cell to another.
+    #[inline]
+    pub(crate) fn offset(&self, at: u32, from: u32) -> Offset {
+        let (a, b) = (self.xy(at), self.xy(from));
+        (a.0 - b.0, a.1 - b.1)
     }
 
     #[inline]
@@ -192,6 +217,30 @@ impl Ground {
         cells
     }
 
+    /// The lattice point by which bodies of these classes come to a place that may lie beside the
+    /// lattice, but none of these sorted cells; none if there is none.
+    pub(crate) fn entry(
+        &self,
+        scene: &Scene,
+        classes: &[usize],
+        at: Vec2,
+        but: &[u32],
+    ) -> Option<u32> {
+        if let Some(cell) = scene.lattice.cell(at) {
+            return Some(cell);
+        }
+        let joins = |cell: &u32| {
+            let end = scene.lattice.at(*cell);
+            classes.iter().all(|&class| {
+                let walls = self.walls(class);
+                walls.is_free(*cell) && walls.straight_is_free(scene, at, end)
+            }) && but.binary_search(cell).is_err()
+        };
+        let far = |cell: &u32| (scene.lattice.at(*cell) - at).norm();
+        let near = scene.lattice.around(at).filter(joins);
+        near.min_by(|a, b| far(a).total_cmp(&far(b)))
+    }
+
     /// Distances to `to` for a class of bodies, walls only; worked out once.
     pub(crate) fn field(&mut self, scene: &Scene, class: usize, to: u32) -> Field {
         if let Some(field) = self.fields.get(&(class, to)) {
@@ -220,32 +269,70 @@ pub(crate) const fn duration(direction: usize) -> Time {
     if direction < 4 { STRAIGHT } else { DIAGONAL }
 }
 
-impl Mask {
-    fn of(kept: &Body, there: &Body, pitch_m: f64) -> Self {
-        let steps = ((reach_of(kept) + reach_of(there)) / pitch_m).ceil() as i32;
-        let side = 2 * steps + 1;
-        let mut inside = vec![false; (side * side) as usize];
-        let mut all = Vec::new();
-        for dy in -steps..=steps {
-            for dx in -steps..=steps {
-                let offset = Vec2::new(f64::from(dx), f64::from(dy)) * pitch_m;
-                let meets = kept.parts.iter().any(|part| {
-                    there.parts.iter().any(|other| {
-                        overlap(&part.grown, offset + part.offset, &other.bare, other.offset)
-                    })
-                });
-                if meets {
-                    inside[((dy + steps) * side + dx + steps) as usize] = true;
-                    all.push((dx, dy));
-                }
+/// Offsets from where a robot grasps an object at which a body overlaps that object at rest.
+pub(crate) fn offsets_of_resting(kept: &Body, resting: &Body, pitch_m: f64) -> Vec<Offset> {
+    // A robot with an object has the object for its second part.
+    let object = Body {
+        parts: resting.parts[1..].to_vec(),
+    };
+    offsets_of(kept, &object, pitch_m)
+}
+
+/// Offsets at which one body overlaps another.
+fn offsets_of(kept: &Body, there: &Body, pitch_m: f64) -> Vec<Offset> {
+    let steps = ((reach_of(kept) + reach_of(there)) / pitch_m).ceil() as i32;
+    let mut all = Vec::new();
+    for dy in -steps..=steps {
+        for dx in -steps..=steps {
+            let offset = Vec2::new(f64::from(dx), f64::from(dy)) * pitch_m;
+            let meets = kept.parts.iter().any(|part| {
+                there.parts.iter().any(|other| {
+                    overlap(&part.grown, offset + part.offset, &other.bare, other.offset)
+                })
+            });
+            if meets {
+                all.push((dx, dy));
             }
         }
-        let has = |(dx, dy): Offset| {
-            dx.abs() <= steps
-                && dy.abs() <= steps
-                && inside[((dy + steps) * side + dx + steps) as usize]
+    }
+    all
+}
+
+/// These offsets and all next to them.
+fn grown(offsets: &[Offset]) -> Vec<Offset> {
+    let around =
+        |&(dx, dy): &Offset| (-1..=1).flat_map(move |y| (-1..=1).map(move |x| (dx + x, dy + y)));
+    let mut all: Vec<Offset> = offsets.iter().flat_map(around).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+impl Mask {
+    /// Whether an offset is in it.
+    #[inline]
+    pub(crate) fn has(&self, (dx, dy): Offset) -> bool {
+        let half = self.half;
+        dx.abs() <= half
+            && dy.abs() <= half
+            && self.inside[((dy + half) * (2 * half + 1) + dx + half) as usize]
+    }
+
+    pub(crate) fn of(all: Vec<Offset>) -> Self {
+        let farthest = |(dx, dy): &Offset| dx.abs().max(dy.abs());
+        let steps = all.iter().map(farthest).max().unwrap_or(0);
+        let side = 2 * steps + 1;
+        let mut inside = vec![false; (side * side) as usize];
+        for (dx, dy) in &all {
+            inside[((dy + steps) * side + dx + steps) as usize] = true;
+        }
+        let mut mask = Self {
+            inside,
+            half: steps,
+            ..Self::default()
         };
-        let mut mask = Self::default();
+        let whole = mask.clone();
+        let has = |offset| whole.has(offset);
         for (direction, &(sx, sy)) in DIRECTIONS.iter().enumerate() {
             // An offset from the start is one less the step from the end.
             let entered = all.iter().filter(|(dx, dy)| !has((dx + sx, dy + sy)));

@@ -13,7 +13,8 @@ use std::rc::Rc;
 
 use scene::{ROBOT_ALONE, Scene, Vec2};
 
-use crate::anytime::ground::{EVER, Ground, Time};
+use crate::anytime::ground::{EVER, Ground, Time, duration};
+use crate::anytime::joint::JointMove;
 use crate::anytime::route::{Leg, Piece, Quest, Router, Target, Then};
 use crate::anytime::timeline::{Owner, Timeline};
 
@@ -22,7 +23,7 @@ use crate::anytime::timeline::{Owner, Timeline};
 pub(crate) struct Place {
     /// Centre of the object, m.
     pub(crate) at: Vec2,
-    /// Where the robot grasps it.
+    /// Where the robot grasps it: the lattice point, or the one next to it.
     pub(crate) grasp: u32,
     /// Where it keeps each class of bodies away, sorted.
     pub(crate) cells: Vec<Vec<u32>>,
@@ -47,6 +48,8 @@ pub(crate) struct Track {
     /// Where it begins.
     pub(crate) start: u32,
     pub(crate) deeds: Vec<Deed>,
+    /// Where it stands at each grip, m.
+    pub(crate) stops: Vec<Vec2>,
     /// Deeds from here on are its tail.
     tail: usize,
     /// Where and when the tail begins, and the object that was put down there.
@@ -90,13 +93,14 @@ pub(crate) struct Plan {
     way: Vec<Piece>,
     /// Plans that take this long or longer are not looked for.
     limit: Time,
+    /// Whether a move may leave its robot elsewhere than at home.
+    pub(crate) leaves_away: bool,
 }
 
 impl Place {
-    /// The place of `object` with its centre at `at`; none if its grasp is off the lattice.
+    /// The place of `object` with its centre at `at`; none if no robot can grasp it there.
     pub(crate) fn of(scene: &Scene, ground: &Ground, object: usize, at: Vec2) -> Option<Rc<Self>> {
         let spec = &scene.objects[object];
-        let grasp = scene.lattice.cell(scene.grasp_at(object, at))?;
         let open_to_empty = spec.pass_under;
         let cells = (0..ground.classes)
             .map(|class| {
@@ -111,6 +115,8 @@ impl Place {
         } else {
             ground.around(scene, ROBOT_ALONE.0, &spec.shape, at, false)
         };
+        let classes = [ROBOT_ALONE.0, spec.class.0];
+        let grasp = ground.entry(scene, &classes, scene.grasp_at(object, at), &bare)?;
         Some(Rc::new(Self {
             at,
             grasp,
@@ -130,6 +136,7 @@ impl Plan {
             rests: Vec::new(),
             way: Vec::new(),
             limit: EVER,
+            leaves_away: false,
         }
     }
 
@@ -147,6 +154,7 @@ impl Plan {
             self.tracks.push(Track {
                 start: cell,
                 deeds: Vec::new(),
+                stops: Vec::new(),
                 tail: 0,
                 free: (cell, 0, None),
                 end: (cell, 0),
@@ -180,7 +188,16 @@ impl Plan {
 
     /// When the last robot is done.
     pub(crate) fn makespan(&self) -> Time {
-        self.tracks.iter().map(|track| track.end.1).max().unwrap_or(0)
+        self.tracks
+            .iter()
+            .map(|track| track.end.1)
+            .max()
+            .unwrap_or(0)
+    }
+
+    /// The lattice point of a robot's home.
+    pub(crate) fn home(&self, robot: usize) -> u32 {
+        self.homes[robot]
     }
 
     /// Whether some robot releases its last object later than `limit`, or at it.
@@ -240,7 +257,7 @@ impl Plan {
             &self.quest(wanted, &legs, 0),
             &mut way,
         );
-        if found.is_none() && self.limit == EVER {
+        if found.is_none() && self.leaves_away {
             legs[2].target = Target::Anywhere(None);
             let quest = self.quest(wanted, &legs, 0);
             found = router.find(ground, &self.timeline, &quest, &mut way);
@@ -257,7 +274,8 @@ impl Plan {
         let (moved, nobody) = (self.owner(Some(wanted.object)), self.owner(None));
         let rest = &self.rests[wanted.object];
         let (alone, carrying) = (ROBOT_ALONE.0, ground.carrying[wanted.object]);
-        let mut to = |class: usize, cell: u32| Target::Place(cell, ground.field(scene, class, cell));
+        let mut to =
+            |class: usize, cell: u32| Target::Place(cell, ground.field(scene, class, cell));
         [
             Leg {
                 class: alone,
@@ -292,6 +310,72 @@ impl Plan {
             legs,
             limit: self.limit,
             ignoring_parked,
+        }
+    }
+
+    /// Takes moves over that are made one at a time, a step of one robot after the other.
+    pub(crate) fn replay(&mut self, ground: &Ground, start: &Start, moves: &[(usize, JointMove)]) {
+        self.begin(ground, start, EVER);
+        self.timeline.clear();
+        let mut now = 0;
+        for &(robot, made) in moves {
+            let track = &mut self.tracks[robot];
+            let cell = &mut track.end.0;
+            let before = now;
+            now += match made {
+                JointMove::Step(direction) => duration(direction as usize),
+                JointMove::Grasp(_) => ground.grasp,
+                JointMove::Release(_) => ground.release,
+            };
+            match made {
+                JointMove::Step(direction) => {
+                    *cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
+                    track.deeds.push(Deed::Step(direction, before, now));
+                }
+                JointMove::Grasp(object) => {
+                    let turns = self.rests[object as usize].turns;
+                    track.stops.push(ground.at(*cell));
+                    track
+                        .deeds
+                        .push(Deed::Grasped(u32::from(object), turns, now));
+                }
+                JointMove::Release(object) => {
+                    self.rests[object as usize].turns += 1;
+                    track.stops.push(ground.at(*cell));
+                    track.deeds.push(Deed::Released(u32::from(object), now));
+                }
+            }
+            track.end.1 = now;
+        }
+        for robot in 0..self.tracks.len() {
+            let track = &self.tracks[robot];
+            let owner = robot as Owner;
+            let alone = ROBOT_ALONE.0;
+            let mut walker = self.timeline.enter(ground, owner, alone, track.start, 0);
+            let mut cell = track.start;
+            for (number, deed) in track.deeds.iter().enumerate() {
+                let number = number as u32;
+                match *deed {
+                    Deed::Step(direction, depart, arrive) => {
+                        let direction = direction as usize;
+                        let span = (depart, arrive);
+                        self.timeline
+                            .step(ground, &mut walker, direction, span, number);
+                        cell = cell.wrapping_add_signed(ground.offsets[direction]);
+                    }
+                    Deed::Grasped(object, _, time) => {
+                        let class = ground.carrying[object as usize];
+                        self.timeline.leave(ground, &walker, time, number);
+                        walker = self.timeline.enter(ground, owner, class, cell, time);
+                    }
+                    Deed::Released(_, time) => {
+                        self.timeline.leave(ground, &walker, time, number);
+                        walker = self.timeline.enter(ground, owner, alone, cell, time);
+                    }
+                }
+            }
+            let number = track.deeds.len() as u32;
+            self.timeline.leave(ground, &walker, EVER, number);
         }
     }
 
@@ -500,8 +584,7 @@ impl Plan {
         let (cell, time, _) = track.free;
         let who = (robot as Owner, ROBOT_ALONE.0);
         let directions = tail.iter().filter_map(Deed::direction);
-        self.timeline
-            .take_back(ground, who, cell, directions, time);
+        self.timeline.take_back(ground, who, cell, directions, time);
         tail
     }
 
@@ -527,7 +610,13 @@ impl Plan {
 
     /// Commits a way that was found: of a move (with its class while carrying), or just a way.
     /// When its object is released, or else when it ends.
-    fn enter_way(&mut self, ground: &Ground, robot: usize, way: &[Piece], wanted: Option<&Move>) -> Time {
+    fn enter_way(
+        &mut self,
+        ground: &Ground,
+        robot: usize,
+        way: &[Piece],
+        wanted: Option<&Move>,
+    ) -> Time {
         let owner = robot as Owner;
         let track = &mut self.tracks[robot];
         let (mut cell, begin, left) = track.free;
@@ -566,6 +655,7 @@ impl Plan {
                         rest.place = Rc::clone(&wanted.to);
                         rest.since = end;
                         rest.turns += 1;
+                        track.stops.push(wanted.to.at + ground.grasps[object]);
                         track.deeds.push(Deed::Released(object as u32, end));
                         track.tail = track.deeds.len();
                         track.free = (cell, end, Some(object));
@@ -577,7 +667,10 @@ impl Plan {
                         for (class, cells) in rest.place.cells.iter().enumerate() {
                             self.timeline.vacate(class, cells, id, up);
                         }
-                        track.deeds.push(Deed::Grasped(object as u32, rest.turns, end));
+                        track.stops.push(rest.place.at + ground.grasps[object]);
+                        track
+                            .deeds
+                            .push(Deed::Grasped(object as u32, rest.turns, end));
                         holds = true;
                     }
                     now = end;

@@ -10,7 +10,7 @@
 //! closely as the world allows. Every wait is for something planned earlier, so waits form no
 //! ring. Steps are joined where nothing is waited for, in either direction.
 
-use scene::{Scene, point};
+use scene::{CONTACT_M, Scene, Vec2, point};
 use shm_types::{Action, Grip, NONE, Schedule, Wait};
 
 use crate::anytime::ground::Ground;
@@ -51,8 +51,8 @@ pub(crate) fn write(scene: &Scene, ground: &Ground, plan: &Plan, out: &mut Sched
     for need in needs.iter().flatten() {
         waited[need.robot as usize][need.until as usize] = true;
     }
-    let joined: Vec<Joined> = (plan.tracks().iter().enumerate())
-        .map(|(robot, track)| join(scene, ground, track, &needs[robot], &waited[robot]))
+    let joined: Vec<Joined> = (waited.iter().enumerate())
+        .map(|(robot, waited)| join(scene, ground, plan, robot, &needs[robot], waited))
         .collect();
     let (mut actions, mut waits) = (0, 0);
     out.robot_count = joined.len() as u32;
@@ -133,7 +133,16 @@ fn needs_of(ground: &Ground, plan: &Plan, robot: u32, track: &Track) -> Vec<Need
     needs
 }
 
-fn join(scene: &Scene, ground: &Ground, track: &Track, needs: &[Need], waited: &[bool]) -> Joined {
+fn join(
+    scene: &Scene,
+    ground: &Ground,
+    plan: &Plan,
+    robot: usize,
+    needs: &[Need],
+    waited: &[bool],
+) -> Joined {
+    let track = &plan.tracks()[robot];
+    let mut stops = track.stops.iter();
     let mut joined = Joined {
         actions: Vec::new(),
         granted: Vec::new(),
@@ -143,6 +152,8 @@ fn join(scene: &Scene, ground: &Ground, track: &Track, needs: &[Need], waited: &
     let mut cell = track.start;
     let mut steps = 0;
     let mut heading = None;
+    // Where the robot stands beside the lattice, its next way leads to the lattice first.
+    let mut beside = track.deeds.first().is_some() && !is_at(scene, cell, scene.homes[robot]);
     for (deed, done) in track.deeds.iter().enumerate() {
         let mut waits = false;
         while needs.next_if(|need| need.deed as usize == deed).is_some() {
@@ -150,6 +161,10 @@ fn join(scene: &Scene, ground: &Ground, track: &Track, needs: &[Need], waited: &
         }
         match *done {
             Deed::Step(direction, ..) => {
+                if std::mem::take(&mut beside) {
+                    joined.begin(deed, point(scene.lattice.at(cell)));
+                    heading = None;
+                }
                 cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
                 let to = point(scene.lattice.at(cell));
                 let goes_on = heading == Some(direction) && !waits && steps < MAX_STEPS;
@@ -166,11 +181,21 @@ fn join(scene: &Scene, ground: &Ground, track: &Track, needs: &[Need], waited: &
                 heading = Some(direction);
             }
             Deed::Grasped(object, turn, _) => {
-                joined.grip(deed, scene, cell, Grip::Grasp, object, turn);
+                let from = stops
+                    .next()
+                    .copied()
+                    .unwrap_or_else(|| scene.lattice.at(cell));
+                beside = joined.stop(deed, scene, cell, from);
+                joined.grip(deed, from, Grip::Grasp, object, turn);
                 heading = None;
             }
             Deed::Released(object, _) => {
-                joined.grip(deed, scene, cell, Grip::Release, object, 0);
+                let to = stops
+                    .next()
+                    .copied()
+                    .unwrap_or_else(|| scene.lattice.at(cell));
+                beside = joined.stop(deed, scene, cell, to);
+                joined.grip(deed, to, Grip::Release, object, 0);
                 heading = None;
             }
         }
@@ -179,8 +204,15 @@ fn join(scene: &Scene, ground: &Ground, track: &Track, needs: &[Need], waited: &
         }
         joined.granted.push(joined.actions.len() as u32);
     }
+    if !track.deeds.is_empty() && cell == plan.home(robot) {
+        joined.stop(track.deeds.len(), scene, cell, scene.homes[robot]);
+    }
     joined.granted.push(joined.actions.len() as u32);
     joined
+}
+
+fn is_at(scene: &Scene, cell: u32, at: Vec2) -> bool {
+    (scene.lattice.at(cell) - at).norm() <= CONTACT_M
 }
 
 impl Joined {
@@ -197,12 +229,21 @@ impl Joined {
         });
     }
 
+    /// The last piece of way to a stop beside the lattice, if it is one.
+    fn stop(&mut self, deed: usize, scene: &Scene, cell: u32, at: Vec2) -> bool {
+        let beside = !is_at(scene, cell, at);
+        if beside {
+            self.begin(deed, point(at));
+        }
+        beside
+    }
+
     /// The grip at the end of the last action, or, if there is none or it grips already, of one
     /// without motion.
-    fn grip(&mut self, deed: usize, scene: &Scene, cell: u32, grip: Grip, object: u32, turn: u32) {
+    fn grip(&mut self, deed: usize, at: Vec2, grip: Grip, object: u32, turn: u32) {
         let keeps = |action: &&mut Action| action.grip == Grip::Keep.code();
         if self.actions.last_mut().filter(keeps).is_none() {
-            self.begin(deed, point(scene.lattice.at(cell)));
+            self.begin(deed, point(at));
         }
         if let Some(action) = self.actions.last_mut() {
             (action.grip, action.object, action.turn) = (grip.code(), object, turn);

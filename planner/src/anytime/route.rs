@@ -96,6 +96,8 @@ pub(crate) struct Router {
     rest: Vec<Time>,
     /// Nodes expanded so far.
     pub(crate) expanded: u64,
+    /// Searches made so far.
+    pub(crate) searches: u64,
 }
 
 impl Router {
@@ -108,6 +110,7 @@ impl Router {
             open: BinaryHeap::new(),
             rest: Vec::new(),
             expanded: 0,
+            searches: 0,
         }
     }
 
@@ -119,6 +122,7 @@ impl Router {
         quest: &Quest<'_>,
         way: &mut Vec<Piece>,
     ) -> Option<Time> {
+        self.searches += 1;
         self.begin(ground, quest)?;
         let class = quest.legs[0].class;
         let start = (quest.time, quest.time);
@@ -232,13 +236,7 @@ impl Router {
         self.open.push(Reverse((key, Reverse(node.time), index)));
     }
 
-    fn expand(
-        &mut self,
-        ground: &Ground,
-        timeline: &Timeline,
-        quest: &Quest<'_>,
-        index: u32,
-    ) {
+    fn expand(&mut self, ground: &Ground, timeline: &Timeline, quest: &Quest<'_>, index: u32) {
         let node = self.nodes[index as usize];
         let leg = &quest.legs[node.leg as usize];
         let skip = quest.skip(node.leg as usize);
@@ -292,13 +290,7 @@ impl Router {
     }
 
     /// The end of a leg: the grip, and then the next leg.
-    fn grip(
-        &mut self,
-        ground: &Ground,
-        timeline: &Timeline,
-        quest: &Quest<'_>,
-        index: u32,
-    ) {
+    fn grip(&mut self, ground: &Ground, timeline: &Timeline, quest: &Quest<'_>, index: u32) {
         let node = self.nodes[index as usize];
         let leg = &quest.legs[node.leg as usize];
         let skip = quest.skip(node.leg as usize + 1);

@@ -17,10 +17,11 @@ use std::rc::Rc;
 use scene::{ROBOT_ALONE, Scene};
 
 use crate::anytime::ground::Ground;
+use crate::anytime::order::Random;
 use crate::anytime::plan::Place;
 
-/// Floods after which no sequence is looked for any more.
-const MOST_FLOODS: u64 = 20_000;
+/// Floods of the first attempts; later ones may take more.
+const FLOODS_PER_ATTEMPT: u64 = 2_000;
 /// Stuck objects for which others are set aside, in one arrangement.
 const STUCK_LOOKED_AT: usize = 4;
 /// Intermediate places tried for one object in one arrangement.
@@ -44,6 +45,10 @@ pub(crate) struct Sequencer {
     round: u32,
     queue: VecDeque<u32>,
     visited: HashSet<Vec<u32>>,
+    random: Random,
+    /// Whether objects are tried in the order of dice.
+    is_shuffled: bool,
+    most_floods: u64,
     pub(crate) floods: u64,
     /// Lattice points looked at.
     pub(crate) cells: u64,
@@ -69,18 +74,25 @@ impl Sequencer {
             round: 0,
             queue: VecDeque::new(),
             visited: HashSet::new(),
+            random: Random(7),
+            is_shuffled: false,
+            most_floods: 0,
             floods: 0,
             cells: 0,
         }
     }
 
-    /// A sequence that leads from these places to the goals.
+    /// A sequence that leads from these places to the goals. Another attempt rolls other dice, and
+    /// takes longer.
     pub(crate) fn find(
         &mut self,
         scene: &Scene,
         ground: &Ground,
         start: &[Rc<Place>],
+        attempt: u64,
     ) -> Option<Vec<Step>> {
+        self.is_shuffled = attempt > 0;
+        self.most_floods = self.floods + FLOODS_PER_ATTEMPT * (1 + attempt / 8);
         for asides in [0, 1, 2, 4, start.len() + 4] {
             self.visited.clear();
             let mut places = start.to_vec();
@@ -100,15 +112,20 @@ impl Sequencer {
         steps: &mut Vec<Step>,
         asides: usize,
     ) -> bool {
-        let open: Vec<usize> = (0..places.len())
+        let mut open: Vec<usize> = (0..places.len())
             .filter(|&object| !self.is_at_goal(object, places))
             .collect();
+        if self.is_shuffled {
+            for end in (1..open.len()).rev() {
+                open.swap(end, self.random.below(end + 1));
+            }
+        }
         if open.is_empty() {
             return true;
         }
         let mut key: Vec<u32> = places.iter().map(|place| place.grasp).collect();
         key.push(asides as u32);
-        if self.floods > MOST_FLOODS || !self.visited.insert(key) {
+        if self.floods > self.most_floods || !self.visited.insert(key) {
             return false;
         }
         for &object in &open {
@@ -128,7 +145,20 @@ impl Sequencer {
             let Some(crossing) = self.crossing(ground, places, object) else {
                 continue;
             };
+            // What is to be set aside may itself be shut in.
+            let mut crossed = crossing.crossed.clone();
             for &aside in &crossing.crossed {
+                let (homes, grasp) = (self.homes.clone(), places[aside].grasp);
+                let alone = ROBOT_ALONE.0;
+                self.cheapest(ground, places, aside, alone, &homes, grasp, &mut crossed);
+            }
+            crossed.dedup();
+            if self.is_shuffled {
+                for end in (1..crossed.len()).rev() {
+                    crossed.swap(end, self.random.below(end + 1));
+                }
+            }
+            for &aside in &crossed {
                 for place in self.asides(scene, ground, places, object, aside, &crossing) {
                     if self.try_step(scene, ground, places, steps, (aside, place), fewer) {
                         return true;
@@ -177,15 +207,20 @@ impl Sequencer {
         if !self.reaches(ground, ground.carrying[object], &[from.grasp], &[to.grasp]) {
             return false;
         }
+        // Somebody has to come from a home and get back to it.
         let homes = std::mem::take(&mut self.homes);
-        let mut works = true;
+        let mut open: Vec<u32> = homes.clone();
         for place in [&**from, to] {
             self.block(ground, places, object, ROBOT_ALONE.0);
             self.block_cells(&place.bare);
-            works = works && self.reaches(ground, ROBOT_ALONE.0, &homes, &[place.grasp]);
+            self.reaches(ground, ROBOT_ALONE.0, &[place.grasp], &[]);
+            open.retain(|&home| self.seen[home as usize] == self.round);
+            if open.is_empty() {
+                break;
+            }
         }
         self.homes = homes;
-        works
+        !open.is_empty()
     }
 
     /// Blocks what all objects but one keep a class away from.
@@ -250,11 +285,25 @@ impl Sequencer {
         let class = ground.carrying[object];
         let homes = self.homes.clone();
         let mut crossed = Vec::new();
-        let carrying =
-            self.cheapest(ground, places, object, class, &[from.grasp], goal.grasp, &mut crossed)?;
+        let carrying = self.cheapest(
+            ground,
+            places,
+            object,
+            class,
+            &[from.grasp],
+            goal.grasp,
+            &mut crossed,
+        )?;
         let alone = ROBOT_ALONE.0;
-        let mut ways =
-            self.cheapest(ground, places, object, alone, &homes, from.grasp, &mut crossed)?;
+        let mut ways = self.cheapest(
+            ground,
+            places,
+            object,
+            alone,
+            &homes,
+            from.grasp,
+            &mut crossed,
+        )?;
         ways.extend(self.cheapest(
             ground,
             places,
@@ -372,8 +421,14 @@ impl Sequencer {
         let stride = (reached.len() / PLACES_LOOKED_AT).max(1);
         let mut found = Vec::new();
         for with_goals in [true, false] {
-            for &cell in reached.iter().step_by(stride) {
-                if found.len() >= PLACES_TRIED || self.floods > MOST_FLOODS {
+            let skipped = if self.is_shuffled {
+                self.random.below(reached.len())
+            } else {
+                0
+            };
+            let from_there = reached.iter().skip(skipped);
+            for &cell in from_there.chain(&reached[..skipped]).step_by(stride) {
+                if found.len() >= PLACES_TRIED || self.floods > self.most_floods {
                     return found;
                 }
                 let at = scene.lattice.at(cell) - scene.objects[aside].grasp;

@@ -115,13 +115,7 @@ impl Timeline {
 
     /// The first safe interval of a point that ends after `time`, or at it if it is not empty.
     #[inline]
-    pub(crate) fn gap_after(
-        &self,
-        class: usize,
-        cell: u32,
-        time: Time,
-        skip: Skip,
-    ) -> Option<Gap> {
+    pub(crate) fn gap_after(&self, class: usize, cell: u32, time: Time, skip: Skip) -> Option<Gap> {
         let mut from = 0;
         for busy in &self.lists[self.index(class, cell)] {
             if skip.has(busy) {
@@ -197,7 +191,15 @@ impl Timeline {
         for kept in 0..ground.classes {
             let mask = ground.mask(kept, walker.class);
             self.open(ground, kept, end, &mask.entered[direction], depart);
-            self.close(ground, kept, start, &mask.left[direction], walker.owner, arrive, step);
+            self.close(
+                ground,
+                kept,
+                start,
+                &mask.left[direction],
+                walker.owner,
+                arrive,
+                step,
+            );
             for &offset in &mask.swept[direction] {
                 if let Some(near) = ground.moved(start, offset) {
                     let busy = Busy {

@@ -1,0 +1,324 @@
+//! A complete search beneath all others: over joint configurations of all robots and objects.
+//!
+//! Responsible for: finding a plan wherever there is one on the lattice, or looking at every
+//! configuration that can be reached, as long as there are few enough.
+//! Not responsible for: good plans: robots step one at a time. Whoever follows it lets them move
+//! at the same time (`publish`).
+//!
+//! How: greedy best-first over (cell of each robot, what it holds, cell of each object), visited
+//! configurations kept. A step of one robot, a grasp and a release are the moves. A configuration
+//! in which two bodies touch is one; whether interlocked bodies could move together is not asked.
+//!
+//! Terms: an object's cell is that of a robot which grasps it there.
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap};
+
+use scene::{ClassId, ROBOT_ALONE, Scene};
+
+use crate::anytime::ground::{Field, Ground, Mask, Time, offsets_of_resting};
+use crate::frontier::STRAIGHT;
+
+/// Most configurations that are kept.
+pub(crate) const MOST_CONFIGURATIONS: usize = 1_000_000;
+/// No cell, no object.
+const NONE: u16 = u16::MAX;
+
+/// A move of one robot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum JointMove {
+    /// A step in a direction.
+    Step(u8),
+    /// It grasps this object.
+    Grasp(u16),
+    /// It puts this object down.
+    Release(u16),
+}
+
+/// What came of a search.
+pub(crate) enum Found {
+    /// Moves, each of one robot, in turn.
+    Plan(Vec<(usize, JointMove)>),
+    /// Every configuration that can be reached was looked at: there is no plan on this lattice.
+    Exhausted,
+    /// There are too many configurations.
+    TooMany,
+    /// The search goes on.
+    Open,
+}
+
+/// By robot its cell, what it holds and whose room it is in; by object its cell.
+type Configuration = Box<[u16]>;
+
+/// The search.
+pub(crate) struct Joint {
+    robots: usize,
+    width: u32,
+    homes: Vec<u16>,
+    /// By object: where it shall be.
+    goals: Vec<Option<u16>>,
+    /// By class, then object: offsets from the resting object.
+    resting: Vec<Vec<Mask>>,
+    /// By object: whether a robot that comes for it may be in its room.
+    below: Vec<bool>,
+    pass_under: Vec<bool>,
+    to_goal: Vec<Option<Field>>,
+    to_home: Vec<Field>,
+    known: HashMap<Configuration, u32>,
+    list: Vec<(Configuration, u32, u8, JointMove)>,
+    open: BinaryHeap<Reverse<(Time, u32)>>,
+}
+
+impl Joint {
+    /// None if this lattice is no exact model, or has too many points.
+    pub(crate) fn new(
+        scene: &Scene,
+        ground: &mut Ground,
+        start: (&[u32], &[u32]),
+        homes: &[u32],
+        goals: &[Option<u32>],
+    ) -> Option<Self> {
+        let exact = scene.lattice.exact && scene.robot.clearance_m == 0.0;
+        if !exact || ground.points() >= usize::from(NONE) {
+            return None;
+        }
+        let objects = &scene.objects;
+        let body = |class: usize| scene.body(ClassId(class));
+        let resting = (0..ground.classes)
+            .map(|kept| {
+                (objects.iter())
+                    .map(|object| {
+                        let there = body(object.class.0);
+                        let pitch_m = scene.lattice.pitch_m;
+                        Mask::of(offsets_of_resting(body(kept), there, pitch_m))
+                    })
+                    .collect()
+            })
+            .collect();
+        let mut joint = Self {
+            robots: homes.len(),
+            width: scene.lattice.width,
+            homes: homes.iter().map(|&cell| cell as u16).collect(),
+            goals: goals
+                .iter()
+                .map(|goal| goal.map(|cell| cell as u16))
+                .collect(),
+            resting,
+            below: (0..objects.len())
+                .map(|object| scene.lifts_from_below(object))
+                .collect(),
+            pass_under: objects.iter().map(|object| object.pass_under).collect(),
+            to_goal: (goals.iter().enumerate())
+                .map(|(object, goal)| {
+                    goal.map(|goal| ground.field(scene, objects[object].class.0, goal))
+                })
+                .collect(),
+            to_home: homes
+                .iter()
+                .map(|&home| ground.field(scene, ROBOT_ALONE.0, home))
+                .collect(),
+            known: HashMap::new(),
+            list: Vec::new(),
+            open: BinaryHeap::new(),
+        };
+        let mut first = vec![NONE; 3 * homes.len() + objects.len()];
+        for (robot, &cell) in start.0.iter().enumerate() {
+            first[3 * robot] = cell as u16;
+        }
+        for (object, &cell) in start.1.iter().enumerate() {
+            first[3 * homes.len() + object] = cell as u16;
+        }
+        joint.offer(first.into(), (u32::MAX, 0, JointMove::Step(0)));
+        Some(joint)
+    }
+
+    /// Looks at so many configurations more.
+    pub(crate) fn advance(&mut self, ground: &Ground, count: usize) -> Found {
+        for _ in 0..count {
+            let Some(Reverse((_, index))) = self.open.pop() else {
+                return Found::Exhausted;
+            };
+            if self.is_end(&self.list[index as usize].0) {
+                return Found::Plan(self.trace(index));
+            }
+            if self.list.len() > MOST_CONFIGURATIONS {
+                return Found::TooMany;
+            }
+            for robot in 0..self.robots {
+                self.expand(ground, index, robot);
+            }
+        }
+        Found::Open
+    }
+
+    /// Configurations seen.
+    pub(crate) fn seen(&self) -> usize {
+        self.list.len()
+    }
+
+    fn objects<'a>(&self, at: &'a [u16]) -> &'a [u16] {
+        &at[3 * self.robots..]
+    }
+
+    fn is_end(&self, at: &[u16]) -> bool {
+        let home = |robot: usize| at[3 * robot] == self.homes[robot] && at[3 * robot + 1] == NONE;
+        (0..self.robots).all(home)
+            && (self.objects(at).iter().zip(&self.goals))
+                .all(|(cell, goal)| *cell != NONE && goal.is_none_or(|goal| goal == *cell))
+    }
+
+    fn expand(&mut self, ground: &Ground, index: u32, robot: usize) {
+        let at = self.list[index as usize].0.clone();
+        let (cell, held) = (at[3 * robot], at[3 * robot + 1]);
+        let class = match held {
+            NONE => ROBOT_ALONE.0,
+            object => ground.carrying[object as usize],
+        };
+        let steps = ground.walls(class).steps(u32::from(cell));
+        for direction in 0..4_u8 {
+            if steps >> direction & 1 == 0 {
+                continue;
+            }
+            let next = u32::from(cell).wrapping_add_signed(ground.offsets[direction as usize]);
+            let Some(room) = self.room(ground, &at, robot, class, next) else {
+                continue;
+            };
+            // Under an object one comes for it, or has just put it down: nobody passes.
+            let was_in = at[3 * robot + 2];
+            let came = was_in != NONE && was_in & 1 == 0;
+            if came && room != was_in >> 1 {
+                continue;
+            }
+            let mut then = at.clone();
+            then[3 * robot] = next as u16;
+            then[3 * robot + 2] = match (room, was_in) {
+                (NONE, _) => NONE,
+                (room, was_in) if was_in != NONE && was_in >> 1 == room => was_in,
+                (room, _) => room << 1,
+            };
+            self.offer(then, (index, robot as u8, JointMove::Step(direction)));
+        }
+        if held == NONE {
+            for object in 0..self.objects(&at).len() {
+                if self.objects(&at)[object] == cell {
+                    let mut then = at.clone();
+                    then[3 * robot + 1] = object as u16;
+                    then[3 * robot + 2] = NONE;
+                    then[3 * self.robots + object] = NONE;
+                    let class = ground.carrying[object];
+                    // With the object its body may meet who is under it.
+                    if self
+                        .room(ground, &then, robot, class, u32::from(cell))
+                        .is_some()
+                    {
+                        self.offer(then, (index, robot as u8, JointMove::Grasp(object as u16)));
+                    }
+                }
+            }
+        } else {
+            let mut then = at.clone();
+            then[3 * robot + 1] = NONE;
+            then[3 * robot + 2] = if self.below[held as usize] {
+                held << 1 | 1
+            } else {
+                NONE
+            };
+            then[3 * self.robots + held as usize] = cell;
+            self.offer(then, (index, robot as u8, JointMove::Release(held)));
+        }
+    }
+
+    /// Whether a body can be at a cell: the object in whose room it then is, or [`NONE`] for
+    /// nobody's; nothing if it cannot be there.
+    fn room(
+        &self,
+        ground: &Ground,
+        at: &[u16],
+        robot: usize,
+        class: usize,
+        cell: u32,
+    ) -> Option<u16> {
+        for other in 0..self.robots {
+            if other == robot {
+                continue;
+            }
+            let there = match at[3 * other + 1] {
+                NONE => ROBOT_ALONE.0,
+                object => ground.carrying[object as usize],
+            };
+            if ground.meet(class, cell, there, u32::from(at[3 * other])) {
+                return None;
+            }
+        }
+        let mut room = NONE;
+        for (object, &place) in self.objects(at).iter().enumerate() {
+            if place == NONE || class == ROBOT_ALONE.0 && self.pass_under[object] {
+                continue;
+            }
+            let offset = ground.offset(cell, u32::from(place));
+            if self.resting[class][object].has(offset) {
+                if class != ROBOT_ALONE.0 || !self.below[object] || room != NONE {
+                    return None;
+                }
+                room = object as u16;
+            }
+        }
+        Some(room)
+    }
+
+    fn offer(&mut self, then: Configuration, from: (u32, u8, JointMove)) {
+        if self.known.contains_key(&then) {
+            return;
+        }
+        let Some(ahead) = self.ahead(&then) else {
+            return;
+        };
+        let index = self.list.len() as u32;
+        self.known.insert(then.clone(), index);
+        self.list.push((then, from.0, from.1, from.2));
+        self.open.push(Reverse((ahead, index)));
+    }
+
+    /// How much is left to do, roughly; none if an object can never get to its goal from there.
+    fn ahead(&self, at: &[u16]) -> Option<Time> {
+        let mut ahead: Time = 0;
+        for (object, field) in self.to_goal.iter().enumerate() {
+            let Some(field) = field else { continue };
+            let held = (0..self.robots).find(|&robot| at[3 * robot + 1] == object as u16);
+            let cell = held.map_or(self.objects(at)[object], |robot| at[3 * robot]);
+            ahead = ahead.saturating_add(4 * field[cell as usize].checked_sub(1)?);
+            let is_there = self.goals[object] == Some(cell);
+            if held.is_none() && !is_there {
+                // Somebody has yet to come.
+                let far = |robot: usize| {
+                    let (a, b) = (u32::from(at[3 * robot]), u32::from(cell));
+                    let (w, up) = (self.width, (a / self.width).abs_diff(b / self.width));
+                    (up + (a % w).abs_diff(b % w)) * STRAIGHT
+                };
+                let nearest = (0..self.robots).map(far).min().unwrap_or(0);
+                ahead = ahead.saturating_add(nearest).saturating_add(STRAIGHT);
+            }
+        }
+        if ahead == 0 {
+            for robot in 0..self.robots {
+                let field = &self.to_home[robot];
+                ahead = ahead.saturating_add(field[at[3 * robot] as usize].saturating_sub(1) / 8);
+            }
+        }
+        Some(ahead)
+    }
+
+    fn trace(&self, mut index: u32) -> Vec<(usize, JointMove)> {
+        let mut moves = Vec::new();
+        loop {
+            let (_, parent, robot, made) = &self.list[index as usize];
+            if *parent == u32::MAX {
+                break;
+            }
+            moves.push((*robot as usize, *made));
+            index = *parent;
+        }
+        moves.reverse();
+        moves
+    }
+}
