@@ -16,9 +16,10 @@ use scene::{Budget, Method, Scene, Settings};
 use shm_types::capacity::MAX_CONSTRAINTS;
 use shm_types::{
     Checked, ConstraintTable, Counters, HardAnswer, HardRequest, PlannerReport, Schedule,
-    StateHash, WorldSnapshot, zeroed,
+    SnapshotHeader, StateHash, Verdict, WorldSnapshot, zeroed,
 };
 
+use crate::anytime::{Anytime, Standing};
 use crate::hard::{Found, HardConstraints};
 use crate::places::Places;
 
@@ -71,6 +72,10 @@ pub struct Planner {
     schedule: Option<Box<Schedule>>,
     /// Its version when it was published last; 0 if it never was.
     schedule_version: u32,
+    /// Who makes it.
+    anytime: Option<Anytime>,
+    /// How planning ahead stands.
+    standing: Standing,
     counters: Counters,
     /// Everything decided so far, in order.
     journal: StateHash,
@@ -94,8 +99,10 @@ impl Planner {
             answers: Vec::with_capacity(3 * robots),
             table,
             dropped: 0,
-            schedule: None,
+            schedule: settings.method.plans_ahead().then(zeroed),
             schedule_version: 0,
+            anytime: (settings.method.plans_ahead()).then(|| Anytime::new(&settings)),
+            standing: Standing::Idle(Verdict::Open),
             counters: Counters::default(),
             journal: StateHash::new(),
         }
@@ -107,6 +114,8 @@ impl Planner {
     pub fn with_schedule(scene: &Scene, settings: Settings, schedule: Box<Schedule>) -> Self {
         Self {
             schedule: Some(schedule),
+            anytime: None,
+            standing: Standing::Written,
             ..Self::new(scene, settings)
         }
     }
@@ -124,7 +133,7 @@ impl Planner {
         let mut budget = Budget::new(units);
         let plans_ahead = self.method.plans_ahead();
         let publish = !plans_ahead && self.work(scene, input.snapshot, &mut budget);
-        let reschedule = plans_ahead && self.date_schedule(header.schedule_version, header.tick);
+        let reschedule = plans_ahead && self.plan_ahead(scene, header, &mut budget);
         self.counters.units += budget.spent();
         if publish {
             self.write_table(header.tick + 1);
@@ -148,18 +157,26 @@ impl Planner {
         &self.table
     }
 
-    /// Numbers and dates the schedule, if there is one that was not published yet.
-    fn date_schedule(&mut self, in_force: u32, tick: u64) -> bool {
+    /// Goes on planning ahead. Whether a schedule is to be published: it is numbered and dated. A
+    /// planner that was started again leaves the robots with the schedule that is in force.
+    fn plan_ahead(&mut self, scene: &Scene, header: &SnapshotHeader, budget: &mut Budget) -> bool {
         let Some(schedule) = self.schedule.as_deref_mut() else {
             return false;
         };
-        if self.schedule_version > 0 {
+        if self.schedule_version > 0 || header.schedule_version > 0 {
             return false;
         }
-        schedule.version = in_force + 1;
-        schedule.effect_tick = tick + 1;
+        if let Some(anytime) = &mut self.anytime {
+            self.standing = anytime.advance(scene, budget, &mut self.counters, schedule);
+        }
+        if self.standing != Standing::Written {
+            return false;
+        }
+        self.standing = Standing::Idle(Verdict::Open);
+        schedule.version = header.schedule_version + 1;
+        schedule.effect_tick = header.tick + 1;
         self.schedule_version = schedule.version;
-        self.journal.add(&[u64::from(schedule.version), tick]);
+        schedule.hash_into(&mut self.journal);
         true
     }
 
@@ -317,7 +334,16 @@ impl Planner {
             state_hash: self.state_hash(),
             constraints_version: self.table.version,
             schedule_version: self.schedule_version,
-            busy: u32::from(self.job.is_some() || !self.queue.is_empty() || outstanding),
+            busy: u32::from(
+                self.job.is_some()
+                    || !self.queue.is_empty()
+                    || outstanding
+                    || self.standing == Standing::Busy,
+            ),
+            verdict: match self.standing {
+                Standing::Idle(verdict) => verdict.code(),
+                Standing::Busy | Standing::Written => Verdict::Open.code(),
+            },
             constraints_dropped: self.dropped,
             counters: self.counters,
             ..PlannerReport::default()
