@@ -80,8 +80,6 @@ pub(crate) struct Ground {
     pub(crate) grasps: Vec<Vec2>,
     /// Seconds in a unit of time.
     pub(crate) second_per_unit: f64,
-    /// Time in a tick, at least 1.
-    pub(crate) tick: Time,
     pub(crate) grasp: Time,
     pub(crate) release: Time,
     pub(crate) counters: Counters,
@@ -132,7 +130,6 @@ impl Ground {
             fields: HashMap::new(),
             flood: DistanceField::new(scene),
             second_per_unit,
-            tick: ((tick_s / second_per_unit).ceil() as Time).max(1),
             grasp: units(scene.robot.grasp_ns),
             release: units(scene.robot.release_ns),
             counters: Counters::default(),

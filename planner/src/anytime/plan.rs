@@ -181,11 +181,6 @@ impl Plan {
         &self.tracks
     }
 
-    /// Where an object is left.
-    pub(crate) fn place(&self, object: usize) -> &Rc<Place> {
-        &self.rests[object].place
-    }
-
     /// When the last robot is done.
     pub(crate) fn makespan(&self) -> Time {
         self.tracks

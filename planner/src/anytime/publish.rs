@@ -153,7 +153,7 @@ fn join(
     let mut steps = 0;
     let mut heading = None;
     // Where the robot stands beside the lattice, its next way leads to the lattice first.
-    let mut beside = track.deeds.first().is_some() && !is_at(scene, cell, scene.homes[robot]);
+    let mut beside = !track.deeds.is_empty() && !is_at(scene, cell, scene.homes[robot]);
     for (deed, done) in track.deeds.iter().enumerate() {
         let mut waits = false;
         while needs.next_if(|need| need.deed as usize == deed).is_some() {

@@ -132,10 +132,10 @@ impl Sequencer {
             let Some(goal) = self.goals[object].clone() else {
                 continue;
             };
-            if self.can_move(ground, places, object, &goal) {
-                if self.try_step(scene, ground, places, steps, (object, goal), asides) {
-                    return true;
-                }
+            if self.can_move(ground, places, object, &goal)
+                && self.try_step(scene, ground, places, steps, (object, goal), asides)
+            {
+                return true;
             }
         }
         let Some(fewer) = asides.checked_sub(1) else {
