@@ -29,6 +29,7 @@ Examples:
   rearrange run room.toml --robots 2 --json  your own room, the result as JSON
   rearrange scenarios                        the rooms inside this binary
   rearrange validate room.toml               is a scenario file right?
+  rearrange explain swap                     what has to come before what, and why
 
 Logs go to stderr: RUST_LOG=debug shows more. NO_COLOR and pipes are respected.";
 
@@ -40,6 +41,8 @@ pub(crate) enum Command {
     Check(CheckArgs),
     /// Make a page that plays a trace, or a still of it
     View(ViewArgs),
+    /// Say what has to come before what in a scenario, and why
+    Explain(ExplainArgs),
     /// Make a random room that is certain to have a solution
     Generate(GenerateArgs),
     /// Print the JSON Schema of scenario files
@@ -146,6 +149,31 @@ impl ViewArgs {
     pub(crate) fn clash(&self) -> bool {
         self.output.is_some() && self.output == self.svg
     }
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = format!("\
+Every constraint is told with its reason; then who waits for whom, rings of such waiting, a proof
+if one shows that the scenario cannot be solved and what to do about it, and how fast any plan can
+be at best. docs/explain.md says how to read it.
+
+Examples:
+  rearrange explain swap
+  rearrange explain room.toml --robots 2 --json
+
+{STATUSES}"))]
+pub(crate) struct ExplainArgs {
+    /// Scenario file (TOML), or the name of a built-in scenario
+    pub(crate) scenario: String,
+    /// Take only the first M robots
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=MAX_ROBOTS))]
+    pub(crate) robots: Option<u32>,
+    /// Make so many path searches for constraints at most
+    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    pub(crate) searches: u64,
+    /// Print one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -35,7 +35,7 @@ pub(crate) enum Exit {
 /// Printed below the help of every command that runs something.
 pub(crate) const STATUSES: &str = "\
 Exit status:
-  0    solved (check: no violation; validate: nothing wrong)
+  0    solved (check: no violation; validate: nothing wrong; explain: no proof against it)
   1    bench compare: something got worse beyond the noise
   2    the command line is wrong
   3    bad scenario, or a trace that cannot be read

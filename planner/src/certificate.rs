@@ -78,7 +78,11 @@ fn has_to_move(scene: &Scene, object: usize) -> bool {
 }
 
 /// The shortest ring through `object`, from its lowest member on; none if it is in none.
-fn shortest_ring(graph: &PriorityGraph, count: usize, object: usize) -> Option<Vec<usize>> {
+pub(crate) fn shortest_ring(
+    graph: &PriorityGraph,
+    count: usize,
+    object: usize,
+) -> Option<Vec<usize>> {
     let mut from = vec![None; count];
     let mut reached = vec![object];
     let mut next = 0;

@@ -5,6 +5,7 @@
 
 mod bench;
 mod check;
+mod explain;
 mod generate;
 mod list;
 mod roles;
@@ -41,6 +42,7 @@ fn dispatch(command: Command) -> Outcome {
         Command::Run(args) => run::main(&args),
         Command::Check(args) => check::main(&args),
         Command::View(args) => view::main(&args),
+        Command::Explain(args) => explain::main(&args),
         Command::Generate(args) => generate::main(&args),
         Command::Schema => schema::main(),
         Command::Validate(args) => validate::main(&args),

@@ -4,6 +4,7 @@
 
 mod bad_input;
 mod benchmarks;
+mod explain;
 mod latency;
 mod processes;
 mod rooms;

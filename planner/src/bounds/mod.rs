@@ -20,18 +20,13 @@ mod routes;
 mod timing;
 mod yardstick;
 
-use scene::{Budget, Scene};
-use shm_types::{ConstraintKind, Counters, index};
+use scene::Scene;
 
 use crate::bounds::matching::least_assignment;
 use crate::bounds::timing::{Model, Timing};
 use crate::bounds::yardstick::longest_s;
-use crate::easy::EasyConstraints;
-use crate::event::Precedence;
-use crate::floods::Floods;
-use crate::kind::Kind;
 use crate::legs::{LEG_EXACTNESS, Legs};
-use crate::places::Places;
+use crate::store::Store;
 
 pub use yardstick::{MOST_ROBOTS, MOST_TASKS, Yardstick};
 
@@ -44,6 +39,8 @@ const MOST_ASSIGNED: usize = 400;
 pub struct BoundLimits {
     /// Lattice points, over all floods, beyond which nothing is worked out.
     pub points: usize,
+    /// Path searches for constraints; with fewer known all bounds are lower, and R is lower too.
+    pub searches: u64,
     /// Partial plans that are looked at for R.
     pub nodes: u64,
 }
@@ -52,6 +49,7 @@ impl Default for BoundLimits {
     fn default() -> Self {
         Self {
             points: 50_000_000,
+            searches: 5_000,
             nodes: 250_000,
         }
     }
@@ -81,7 +79,8 @@ impl Bounds {
             return None;
         }
         let grips_s = [scene.robot.grasp_ns, scene.robot.release_ns].map(|ns| ns as f64 / 1e9);
-        let model = Model::new(&Legs::of(scene), grips_s.into(), necessary(scene))?;
+        let store = Store::of(scene, limits.searches);
+        let model = Model::new(&Legs::of(scene), grips_s.into(), store.precedences())?;
         Self::of_model(&model, limits.nodes)
     }
 
@@ -144,32 +143,4 @@ fn shared_s(model: &Model) -> Option<f64> {
     let reaches = |robot: &usize| (0..count).any(|k| model.approach_s(*robot, k).is_finite());
     let shares = (0..robots).filter(reaches).count();
     Some((ways_s + busy_s) / shares.max(1) as f64)
-}
-
-/// The necessary constraints between two tasks' events (rule 27), from the easy and the hard
-/// tests.
-fn necessary(scene: &Scene) -> Vec<Precedence> {
-    let open = || Places::at_start(scene).map(|places| places.filter(Places::is_open));
-    let mut found = Vec::new();
-    let mut easy = EasyConstraints::new(scene);
-    easy.begin(open());
-    let (mut budget, mut counters) = (Budget::new(u64::MAX), Counters::default());
-    while easy.advance(scene, &mut budget, &mut counters).is_pending() {}
-    easy.for_each(|kind, before, after| {
-        // An edge undone: which task was the one, which the other.
-        let (one, two) = kind.edge(before, after);
-        found.push(kind.precedence(one, two));
-    });
-    for hard in Floods::of(scene, open()).constraints() {
-        let kind = if hard.kind == ConstraintKind::H1.code() {
-            Kind::H1
-        } else {
-            Kind::H2
-        };
-        if let (Some(before), Some(after)) = (index(hard.before), index(hard.after)) {
-            let (one, two) = kind.edge(before, after);
-            found.push(kind.precedence(one, two));
-        }
-    }
-    found
 }

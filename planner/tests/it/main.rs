@@ -7,6 +7,8 @@ mod certificate;
 #[cfg(test)]
 mod easy;
 #[cfg(test)]
+mod explained;
+#[cfg(test)]
 mod field;
 #[cfg(test)]
 mod floods;
@@ -32,3 +34,5 @@ mod selection;
 mod service;
 #[cfg(test)]
 mod speed;
+#[cfg(test)]
+mod store;
