@@ -224,7 +224,8 @@ impl Ground {
         but: &[u32],
     ) -> Option<u32> {
         if let Some(cell) = scene.lattice.cell(at) {
-            return Some(cell);
+            let free = classes.iter().all(|&class| self.walls(class).is_free(cell));
+            return free.then_some(cell);
         }
         let joins = |cell: &u32| {
             let end = scene.lattice.at(*cell);

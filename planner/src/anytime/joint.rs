@@ -13,10 +13,12 @@
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
+use std::rc::Rc;
 
-use scene::{ClassId, ROBOT_ALONE, Scene};
+use scene::{CONTACT_M, ClassId, ROBOT_ALONE, Scene};
 
 use crate::anytime::ground::{Field, Ground, Mask, Time, offsets_of_resting};
+use crate::anytime::plan::{Place, Start};
 use crate::frontier::STRAIGHT;
 
 /// Most configurations that are kept.
@@ -55,8 +57,12 @@ pub(crate) struct Joint {
     robots: usize,
     width: u32,
     homes: Vec<u16>,
-    /// By object: where it shall be.
+    /// By object: where it shall be; [`NONE`] for one that nobody can move.
     goals: Vec<Option<u16>>,
+    /// By class, then cell: closed by objects that nobody can move.
+    closed: Vec<Vec<bool>>,
+    /// Whether an object that nobody can move, or put there, has to be elsewhere.
+    is_hopeless: bool,
     /// By class, then object: offsets from the resting object.
     resting: Vec<Vec<Mask>>,
     /// By object: whether a robot that comes for it may be in its room.
@@ -74,9 +80,9 @@ impl Joint {
     pub(crate) fn new(
         scene: &Scene,
         ground: &mut Ground,
-        start: (&[u32], &[u32]),
+        start: &Start,
         homes: &[u32],
-        goals: &[Option<u32>],
+        goals: &[Option<Rc<Place>>],
     ) -> Option<Self> {
         let exact = scene.lattice.exact && scene.robot.clearance_m == 0.0;
         if !exact || ground.points() >= usize::from(NONE) {
@@ -99,10 +105,11 @@ impl Joint {
             robots: homes.len(),
             width: scene.lattice.width,
             homes: homes.iter().map(|&cell| cell as u16).collect(),
-            goals: goals
-                .iter()
-                .map(|goal| goal.map(|cell| cell as u16))
+            goals: (goals.iter())
+                .map(|goal| goal.as_ref().map(|place| place.grasp as u16))
                 .collect(),
+            closed: vec![vec![false; ground.points()]; ground.classes],
+            is_hopeless: false,
             resting,
             below: (0..objects.len())
                 .map(|object| scene.lifts_from_below(object))
@@ -110,7 +117,8 @@ impl Joint {
             pass_under: objects.iter().map(|object| object.pass_under).collect(),
             to_goal: (goals.iter().enumerate())
                 .map(|(object, goal)| {
-                    goal.map(|goal| ground.field(scene, objects[object].class.0, goal))
+                    let goal = goal.as_ref().filter(|place| place.is_open())?;
+                    Some(ground.field(scene, objects[object].class.0, goal.grasp))
                 })
                 .collect(),
             to_home: homes
@@ -122,18 +130,38 @@ impl Joint {
             open: BinaryHeap::new(),
         };
         let mut first = vec![NONE; 3 * homes.len() + objects.len()];
-        for (robot, &cell) in start.0.iter().enumerate() {
+        for (robot, &cell) in start.robots.iter().enumerate() {
             first[3 * robot] = cell as u16;
         }
-        for (object, &cell) in start.1.iter().enumerate() {
-            first[3 * homes.len() + object] = cell as u16;
+        for (object, place) in start.objects.iter().enumerate() {
+            if place.is_open() {
+                first[3 * homes.len() + object] = place.grasp as u16;
+                continue;
+            }
+            // Nobody can ever grasp it.
+            let goal = objects[object].goal;
+            joint.is_hopeless |= goal.is_some_and(|goal| (goal - place.at).norm() > CONTACT_M);
+            joint.goals[object] = Some(NONE);
+            joint.to_goal[object] = None;
+            for (class, cells) in place.cells.iter().enumerate() {
+                for &cell in cells {
+                    joint.closed[class][cell as usize] = true;
+                }
+            }
         }
+        let shut = |goal: &Option<Rc<Place>>| goal.as_ref().is_some_and(|goal| !goal.is_open());
+        let open = |place: &Rc<Place>| place.is_open();
+        joint.is_hopeless |=
+            (goals.iter().zip(&start.objects)).any(|(goal, place)| shut(goal) && open(place));
         joint.offer(first.into(), (u32::MAX, 0, JointMove::Step(0)));
         Some(joint)
     }
 
     /// Looks at so many configurations more.
     pub(crate) fn advance(&mut self, ground: &Ground, count: usize) -> Found {
+        if self.is_hopeless {
+            return Found::Exhausted;
+        }
         for _ in 0..count {
             let Some(Reverse((_, index))) = self.open.pop() else {
                 return Found::Exhausted;
@@ -164,7 +192,7 @@ impl Joint {
         let home = |robot: usize| at[3 * robot] == self.homes[robot] && at[3 * robot + 1] == NONE;
         (0..self.robots).all(home)
             && (self.objects(at).iter().zip(&self.goals))
-                .all(|(cell, goal)| *cell != NONE && goal.is_none_or(|goal| goal == *cell))
+                .all(|(cell, goal)| goal.map_or(*cell != NONE, |goal| goal == *cell))
     }
 
     fn expand(&mut self, ground: &Ground, index: u32, robot: usize) {
@@ -238,6 +266,9 @@ impl Joint {
         class: usize,
         cell: u32,
     ) -> Option<u16> {
+        if self.closed[class][cell as usize] {
+            return None;
+        }
         for other in 0..self.robots {
             if other == robot {
                 continue;

@@ -160,7 +160,7 @@ impl Anytime {
                 }
             }
             Stage::Write => {
-                let written = solver.restore(scene).is_some()
+                let written = solver.restore().is_some()
                     && publish::write(scene, &solver.ground, &solver.plan, out).is_some();
                 Stage::Done(if written {
                     Verdict::Open

@@ -17,13 +17,15 @@ use crate::anytime::ground::{EVER, Ground, Time, duration};
 use crate::anytime::joint::JointMove;
 use crate::anytime::route::{Leg, Piece, Quest, Router, Target, Then};
 use crate::anytime::timeline::{Owner, Timeline};
+use crate::frontier::NOWHERE;
 
 /// A place of one object: at rest there, grasped there.
 #[derive(Clone, Debug)]
 pub(crate) struct Place {
     /// Centre of the object, m.
     pub(crate) at: Vec2,
-    /// Where the robot grasps it: the lattice point, or the one next to it.
+    /// Where the robot grasps it: the lattice point, or the one next to it; [`NOWHERE`] if no robot
+    /// can stand there.
     pub(crate) grasp: u32,
     /// Where it keeps each class of bodies away, sorted.
     pub(crate) cells: Vec<Vec<u32>>,
@@ -98,8 +100,13 @@ pub(crate) struct Plan {
 }
 
 impl Place {
-    /// The place of `object` with its centre at `at`; none if no robot can grasp it there.
-    pub(crate) fn of(scene: &Scene, ground: &Ground, object: usize, at: Vec2) -> Option<Rc<Self>> {
+    /// Whether a robot can stand where it is grasped.
+    pub(crate) fn is_open(&self) -> bool {
+        self.grasp != NOWHERE
+    }
+
+    /// The place of `object` with its centre at `at`.
+    pub(crate) fn of(scene: &Scene, ground: &Ground, object: usize, at: Vec2) -> Rc<Self> {
         let spec = &scene.objects[object];
         let open_to_empty = spec.pass_under;
         let cells = (0..ground.classes)
@@ -116,13 +123,13 @@ impl Place {
             ground.around(scene, ROBOT_ALONE.0, &spec.shape, at, false)
         };
         let classes = [ROBOT_ALONE.0, spec.class.0];
-        let grasp = ground.entry(scene, &classes, scene.grasp_at(object, at), &bare)?;
-        Some(Rc::new(Self {
+        let grasp = ground.entry(scene, &classes, scene.grasp_at(object, at), &bare);
+        Rc::new(Self {
             at,
-            grasp,
+            grasp: grasp.unwrap_or(NOWHERE),
             cells,
             bare,
-        }))
+        })
     }
 }
 
@@ -311,7 +318,6 @@ impl Plan {
     /// Takes moves over that are made one at a time, a step of one robot after the other.
     pub(crate) fn replay(&mut self, ground: &Ground, start: &Start, moves: &[(usize, JointMove)]) {
         self.begin(ground, start, EVER);
-        self.timeline.clear();
         let mut now = 0;
         for &(robot, made) in moves {
             let track = &mut self.tracks[robot];
@@ -342,8 +348,15 @@ impl Plan {
             }
             track.end.1 = now;
         }
-        for robot in 0..self.tracks.len() {
-            let track = &self.tracks[robot];
+        let tracks = std::mem::take(&mut self.tracks);
+        self.take_over(ground, tracks);
+    }
+
+    /// Takes over what all robots do: enough to publish it, not to commit more.
+    pub(crate) fn take_over(&mut self, ground: &Ground, tracks: Vec<Track>) {
+        self.timeline.clear();
+        self.tracks = tracks;
+        for (robot, track) in self.tracks.iter().enumerate() {
             let owner = robot as Owner;
             let alone = ROBOT_ALONE.0;
             let mut walker = self.timeline.enter(ground, owner, alone, track.start, 0);

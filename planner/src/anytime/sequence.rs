@@ -149,6 +149,9 @@ impl Sequencer {
             let mut crossed = crossing.crossed.clone();
             for &aside in &crossing.crossed {
                 let (homes, grasp) = (self.homes.clone(), places[aside].grasp);
+                if !places[aside].is_open() {
+                    continue;
+                }
                 let alone = ROBOT_ALONE.0;
                 self.cheapest(ground, places, aside, alone, &homes, grasp, &mut crossed);
             }
@@ -203,6 +206,9 @@ impl Sequencer {
         to: &Place,
     ) -> bool {
         let from = &places[object];
+        if !from.is_open() || !to.is_open() {
+            return false;
+        }
         self.block(ground, places, object, ground.carrying[object]);
         if !self.reaches(ground, ground.carrying[object], &[from.grasp], &[to.grasp]) {
             return false;
@@ -282,6 +288,9 @@ impl Sequencer {
     ) -> Option<Crossing> {
         let goal = self.goals[object].clone()?;
         let from = Rc::clone(&places[object]);
+        if !from.is_open() || !goal.is_open() {
+            return None;
+        }
         let class = ground.carrying[object];
         let homes = self.homes.clone();
         let mut crossed = Vec::new();
@@ -399,6 +408,9 @@ impl Sequencer {
     ) -> Vec<Rc<Place>> {
         let class = ground.carrying[aside];
         let from = Rc::clone(&places[aside]);
+        if !from.is_open() {
+            return Vec::new();
+        }
         // Everything it can be brought to, nearest first.
         self.block(ground, places, aside, class);
         self.reaches(ground, class, &[from.grasp], &[]);
@@ -432,7 +444,8 @@ impl Sequencer {
                     return found;
                 }
                 let at = scene.lattice.at(cell) - scene.objects[aside].grasp;
-                if let Some(place) = Place::of(scene, ground, aside, at)
+                let place = Place::of(scene, ground, aside, at);
+                if place.is_open()
                     && self.is_clear(ground, places, stuck, aside, &place, crossing, with_goals)
                     && self.can_move(ground, places, aside, &place)
                 {

@@ -12,7 +12,7 @@ use shm_types::Verdict;
 use crate::anytime::ground::{EVER, Ground, Time};
 use crate::anytime::joint::{Found, Joint, JointMove};
 use crate::anytime::order::{Hops, Item, Random, change};
-use crate::anytime::plan::{Move, Place, Plan, Start};
+use crate::anytime::plan::{Move, Place, Plan, Start, Track};
 use crate::anytime::route::Router;
 use crate::anytime::sequence::{Sequencer, Step};
 use crate::anytime::{UNITS_PER_CONFIGURATION, UNITS_PER_INTERVAL};
@@ -23,6 +23,49 @@ const CONFIGURATIONS_PER_SLICE: usize = 5_000;
 const LOOKED_AT: usize = 64;
 /// How often in a row nothing may be left to try near the best order until that counts as all.
 const MOST_MISSES: u32 = 30;
+
+/// A plan.
+struct Best {
+    makespan: Time,
+    /// The order it came from; empty if it is the complete search's own.
+    order: Vec<Item>,
+    tracks: Vec<Track>,
+}
+
+/// How moves are committed.
+#[derive(Clone, Copy, Debug)]
+struct Mode {
+    /// Strictly in the order of the sequence.
+    in_turn: bool,
+    /// Robots that are parked in the way go elsewhere.
+    makes_room: bool,
+    /// A robot may end elsewhere than at home, until the last move is made.
+    leaves_away: bool,
+}
+
+/// The ways to make a first plan, in the order in which they are tried.
+const MODES: [Mode; 4] = [
+    Mode {
+        in_turn: false,
+        makes_room: false,
+        leaves_away: false,
+    },
+    Mode {
+        in_turn: true,
+        makes_room: true,
+        leaves_away: false,
+    },
+    Mode {
+        in_turn: false,
+        makes_room: false,
+        leaves_away: true,
+    },
+    Mode {
+        in_turn: true,
+        makes_room: true,
+        leaves_away: true,
+    },
+];
 
 /// Makes plans for one scene.
 pub(crate) struct Solver {
@@ -36,43 +79,36 @@ pub(crate) struct Solver {
     joint: Option<Box<Joint>>,
     /// Configurations that the complete search has seen.
     configurations: u64,
-    /// The plan, if it is the complete search's own.
-    moves: Option<Vec<(usize, JointMove)>>,
     hops: Option<Hops>,
     random: Random,
-    pub(crate) best: Option<(Time, Vec<Item>)>,
+    best: Option<Best>,
     /// Where orders are looked for: near this one.
     current: Vec<Item>,
     /// How often in a row nothing was left to try nearby.
     misses: u32,
     tried: HashSet<Vec<Item>>,
     pub(crate) decoded: u64,
-    /// Whether the first plan needed parked robots to make room.
-    makes_room: bool,
+    mode: Mode,
 }
 
 impl Solver {
-    /// None if some start, goal or home cannot be joined to the lattice.
+    /// None if some home cannot be joined to the lattice.
     pub(crate) fn new(scene: &Scene, settings: &Settings) -> Option<Self> {
         let ground = Ground::new(scene, settings);
         let homes: Option<Vec<u32>> = (scene.homes.iter())
             .map(|&home| ground.entry(scene, &[ROBOT_ALONE.0], home, &[]))
             .collect();
         let homes = homes?;
-        let objects: Option<Vec<Rc<Place>>> = (scene.objects.iter().enumerate())
+        let objects = (scene.objects.iter().enumerate())
             .map(|(object, spec)| Place::of(scene, &ground, object, spec.start))
             .collect();
         let start = Start {
             robots: homes.clone(),
-            objects: objects?,
+            objects,
         };
-        let mut goals = Vec::new();
-        for (object, spec) in scene.objects.iter().enumerate() {
-            goals.push(match spec.goal {
-                Some(goal) => Some(Place::of(scene, &ground, object, goal)?),
-                None => None,
-            });
-        }
+        let goals: Vec<Option<Rc<Place>>> = (scene.objects.iter().enumerate())
+            .map(|(object, spec)| Some(Place::of(scene, &ground, object, spec.goal?)))
+            .collect();
         Some(Self {
             router: Router::new(&ground),
             plan: Plan::new(&ground, homes.clone()),
@@ -83,7 +119,6 @@ impl Solver {
             goals,
             joint: None,
             configurations: 0,
-            moves: None,
             hops: None,
             random: Random(1),
             best: None,
@@ -91,7 +126,7 @@ impl Solver {
             misses: 0,
             tried: HashSet::new(),
             decoded: 0,
-            makes_room: false,
+            mode: MODES[0],
         })
     }
 
@@ -125,17 +160,19 @@ impl Solver {
     fn begin_with(&mut self, scene: &Scene, sequence: &[Step]) -> Option<Time> {
         let hops = Hops::new(scene, &mut self.ground, &self.start, &self.homes, sequence);
         let objects: Vec<u32> = sequence.iter().map(|(object, _)| *object as u32).collect();
-        let mut found = self.greedy(scene, &hops, &objects, false);
-        self.makes_room = found.is_none();
-        if found.is_none() {
-            found = self.greedy(scene, &hops, &objects, true);
+        let mut found = None;
+        for mode in MODES {
+            self.mode = mode;
+            found = self.greedy(scene, &hops, &objects);
+            if found.is_some() {
+                break;
+            }
         }
         self.hops = Some(hops);
         let (makespan, order) = found?;
         self.tried.insert(order.clone());
         self.current.clone_from(&order);
-        self.best = Some((makespan, order));
-        Some(makespan)
+        Some(self.keep(makespan, order))
     }
 
     /// A first plan by the complete search, a slice of it: nothing while it goes on, then whether
@@ -144,13 +181,8 @@ impl Solver {
         let mut joint = match self.joint.take() {
             Some(joint) => joint,
             None => {
-                let cells: Vec<u32> = self.start.objects.iter().map(|at| at.grasp).collect();
-                let goals: Vec<Option<u32>> = (self.goals.iter())
-                    .map(|goal| goal.as_ref().map(|place| place.grasp))
-                    .collect();
-                let start = (&self.start.robots[..], &cells[..]);
-                let homes = &self.homes;
-                match Joint::new(scene, &mut self.ground, start, homes, &goals) {
+                let (start, homes) = (&self.start, &self.homes);
+                match Joint::new(scene, &mut self.ground, start, homes, &self.goals) {
                     Some(joint) => Box::new(joint),
                     None => return Some(Err(Verdict::NotFound)),
                 }
@@ -184,9 +216,7 @@ impl Solver {
                 JointMove::Release(object) => {
                     let object = usize::from(object);
                     let at = scene.lattice.at(cells[robot]) - scene.objects[object].grasp;
-                    sequence.extend(
-                        Place::of(scene, &self.ground, object, at).map(|place| (object, place)),
-                    );
+                    sequence.push((object, Place::of(scene, &self.ground, object, at)));
                 }
             }
         }
@@ -194,25 +224,35 @@ impl Solver {
             return makespan;
         }
         self.plan.replay(&self.ground, &self.start, &moves);
-        self.moves = Some(moves);
-        self.plan.makespan()
+        self.hops = None;
+        self.keep(self.plan.makespan(), Vec::new())
     }
 
-    /// Commits the moves of a sequence, each by the robot that is done with it soonest: whichever
-    /// of them is soonest, or strictly in turn.
+    /// Keeps the plan as the best one.
+    fn keep(&mut self, makespan: Time, order: Vec<Item>) -> Time {
+        let tracks = self.plan.tracks().to_vec();
+        self.best = Some(Best {
+            makespan,
+            order,
+            tracks,
+        });
+        makespan
+    }
+
+    /// Commits the moves of a sequence, each by the robot that is done with it soonest.
     fn greedy(
         &mut self,
         scene: &Scene,
         hops: &Hops,
         sequence: &[u32],
-        in_turn: bool,
     ) -> Option<(Time, Vec<Item>)> {
         self.decoded += 1;
         self.plan.begin(&self.ground, &self.start, EVER);
+        self.plan.leaves_away = self.mode.leaves_away;
         let mut left = sequence.to_vec();
         let mut order: Vec<Item> = Vec::new();
         while !left.is_empty() {
-            let looked_at = if in_turn { 1 } else { left.len() };
+            let looked_at = if self.mode.in_turn { 1 } else { left.len() };
             let mut candidates: Vec<(Time, usize, usize)> = Vec::new();
             for (place, &object) in left[..looked_at].iter().enumerate() {
                 if left[..place].contains(&object) {
@@ -224,15 +264,9 @@ impl Solver {
                 }
             }
             candidates.sort_unstable();
-            let mut taken = None;
-            for leaves_away in [false, true] {
-                self.plan.leaves_away = leaves_away;
-                taken = taken.or_else(|| {
-                    candidates.iter().copied().find(|&(_, place, robot)| {
-                        self.commit(scene, hops, &order, (left[place], robot as u32), in_turn)
-                    })
-                });
-            }
+            let taken = candidates.into_iter().find(|&(_, place, robot)| {
+                self.commit(scene, hops, &order, (left[place], robot as u32))
+            });
             let (_, place, robot) = taken?;
             order.push((left.remove(place), robot as u32));
         }
@@ -249,7 +283,6 @@ impl Solver {
         hops: &Hops,
         order: &[Item],
         (object, robot): Item,
-        makes_room: bool,
     ) -> bool {
         let made = order.iter().filter(|item| item.0 == object).count();
         let hop = &hops.list[hops.of[object as usize].0 + made];
@@ -259,7 +292,7 @@ impl Solver {
             to: Rc::clone(&hop.to),
         };
         let (plan, ground, router) = (&mut self.plan, &mut self.ground, &mut self.router);
-        let done = if makes_room {
+        let done = if self.mode.makes_room {
             plan.commit_making_room(ground, router, scene, &wanted)
         } else {
             plan.commit(ground, router, scene, &wanted)
@@ -271,11 +304,9 @@ impl Solver {
     fn decode(&mut self, scene: &Scene, hops: &Hops, order: &[Item], limit: Time) -> Option<Time> {
         self.decoded += 1;
         self.plan.begin(&self.ground, &self.start, limit);
-        self.plan.leaves_away = self.makes_room;
+        self.plan.leaves_away = self.mode.leaves_away;
         for (place, &item) in order.iter().enumerate() {
-            if !self.commit(scene, hops, &order[..place], item, self.makes_room)
-                || self.plan.is_past(limit)
-            {
+            if !self.commit(scene, hops, &order[..place], item) || self.plan.is_past(limit) {
                 return None;
             }
         }
@@ -294,7 +325,7 @@ impl Solver {
     }
 
     fn improve_with(&mut self, scene: &Scene, hops: &Hops) -> bool {
-        let Some(best) = self.best.as_ref().map(|(best, _)| *best) else {
+        let Some(best) = self.best.as_ref().map(|best| best.makespan) else {
             return false;
         };
         let mut chosen: Option<(Time, Vec<Item>)> = None;
@@ -313,7 +344,7 @@ impl Solver {
         }
         let Some((_, near)) = chosen else {
             self.misses += 1;
-            self.current = self.best.clone().map_or_else(Vec::new, |(_, order)| order);
+            self.go_back();
             return self.misses < MOST_MISSES;
         };
         self.misses = 0;
@@ -323,119 +354,25 @@ impl Solver {
         if let Some(makespan) = self.decode(scene, hops, &near, limit) {
             self.current.clone_from(&near);
             if makespan < best {
-                self.best = Some((makespan, near));
+                self.keep(makespan, near);
             }
         } else if self.random.below(8) == 0 {
-            self.current = self.best.clone().map_or_else(Vec::new, |(_, order)| order);
+            self.go_back();
         }
         true
     }
 
-    /// Puts the best order into the plan again.
-    pub(crate) fn restore(&mut self, scene: &Scene) -> Option<Time> {
-        if let Some(moves) = &self.moves {
-            self.plan.replay(&self.ground, &self.start, moves);
-            return Some(self.plan.makespan());
-        }
-        let (_, order) = self.best.clone()?;
-        let hops = self.hops.take()?;
-        let makespan = self.decode(scene, &hops, &order, EVER);
-        self.hops = Some(hops);
-        makespan
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::time::Instant;
-
-    use super::*;
-
-    #[test]
-    #[ignore = "a look at figures"]
-    fn look() {
-        let only = std::env::var("ONLY").unwrap_or_default();
-        for builtin in scene::BUILTIN.iter().filter(|b| b.name.contains(&only)) {
-            let all = scene::parse(builtin.text, builtin.name).unwrap();
-            for robots in 1..=all.homes.len() {
-                let scene = all.with_robots(robots).unwrap();
-                let begun = Instant::now();
-                let Some(mut solver) = Solver::new(&scene, &Settings::default()) else {
-                    println!("{} off the lattice", builtin.name);
-                    continue;
-                };
-                let made = begun.elapsed();
-                let first = (0..20).find_map(|attempt| solver.first(&scene, attempt));
-                let first_at = begun.elapsed();
-                let work = solver.cells();
-                let mut rounds = 0;
-                while rounds < 300 && solver.improve(&scene) {
-                    rounds += 1;
-                }
-                let show = |time: Option<Time>| time.map(|time| solver.ground.seconds(time));
-                println!(
-                    "{} {robots}: made {made:?} first {:?} at {first_at:?} work {work}, best {:?} after {rounds} {:?} work {}",
-                    builtin.name,
-                    show(first),
-                    show(solver.best.as_ref().map(|b| b.0)),
-                    begun.elapsed(),
-                    solver.cells(),
-                );
-            }
+    /// Goes on from the best order.
+    fn go_back(&mut self) {
+        if let Some(best) = &self.best {
+            self.current.clone_from(&best.order);
         }
     }
 
-    #[test]
-    #[ignore = "a look at figures"]
-    fn look_at_generated() {
-        let mut rooms = 0;
-        let mut missed = 0;
-        let mut slowest = 0.0_f64;
-        for seed in 0..12 {
-            for (objects, area_m2) in [(3, 12.0), (5, 17.0), (8, 24.0), (12, 34.0)] {
-                for crowding in [0.2, 0.5, 0.9] {
-                    for extra_moves in [0, 2] {
-                        let robots = 1 + (seed as usize + objects) % 4;
-                        if std::env::var("HARD").is_ok() && !(seed == 0 && objects == 3)
-                            || crowding > 0.4
-                            || extra_moves == 0
-                        {
-                            continue;
-                        }
-                        let Ok(room) = scene::generate(&scene::GenerateOptions {
-                            seed,
-                            objects,
-                            robots,
-                            area_m2,
-                            walls: 3,
-                            crowding,
-                            extra_moves,
-                        }) else {
-                            continue;
-                        };
-                        rooms += 1;
-                        let begun = Instant::now();
-                        let Some(mut solver) = Solver::new(&room.scene, &Settings::default())
-                        else {
-                            println!("off the lattice");
-                            continue;
-                        };
-                        let first = (0..40).find_map(|attempt| solver.first(&room.scene, attempt));
-                        let took_s = begun.elapsed().as_secs_f64();
-                        slowest = slowest.max(took_s);
-                        if first.is_none() {
-                            missed += 1;
-                            println!(
-                                "missed: seed {seed} objects {objects} robots {robots} area {area_m2} crowding {crowding} extra {extra_moves}: sequence {} floods {} {took_s:.2} s, certificate of {}",
-                                solver.hops.is_some(),
-                                solver.sequencer.floods,
-                                room.certificate.len(),
-                            );
-                        }
-                    }
-                }
-            }
-        }
-        println!("rooms {rooms}, missed {missed}, slowest first {slowest:.2} s");
+    /// Puts the best plan in place, to be published.
+    pub(crate) fn restore(&mut self) -> Option<()> {
+        let best = self.best.as_ref()?;
+        self.plan.take_over(&self.ground, best.tracks.clone());
+        Some(())
     }
 }
