@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 
 use scene::builtin::BUILTIN;
 use scene::{Compute, Connectivity, GenerateOptions, Method, Scene, Settings, ShapeDraft};
-use shm_types::{Activity, Checked, MotionBatch, Outcome, WorldSnapshot};
+use shm_types::{Activity, Checked, EventKind, MotionBatch, Outcome, WorldSnapshot};
 use sim::{SimReport, Simulation};
 use trace::{Ending, SceneRecord, Writer};
 
@@ -331,5 +331,75 @@ fn restarted_robots_take_up_where_they_were() {
             report.reason
         );
         assert_eq!(report.world.selection_conflicts, 0);
+    }
+}
+
+/// Rooms that the paper's methods cannot finish among them.
+#[test]
+fn planning_ahead_solves_every_shipped_room_that_can_be_solved() {
+    for scenario in BUILTIN {
+        let all = parse(scenario.name, scenario.text);
+        if planner::certificate(&all).is_some() {
+            continue;
+        }
+        for scene in with_each_number_of_robots(&all) {
+            let report = run(&scene, &with(Method::Anytime));
+            let who = format!("{} × {}", scene.name, scene.homes.len());
+            assert_eq!(
+                report.outcome,
+                Outcome::Solved,
+                "{who}: {:?}",
+                report.reason
+            );
+        }
+    }
+}
+
+/// Half of them need intermediate places.
+#[test]
+fn planning_ahead_solves_random_rooms() {
+    for seed in 0..6 {
+        let options = GenerateOptions {
+            seed,
+            crowding: 0.8,
+            robots: 1 + seed as usize % 4,
+            extra_moves: 2 * (seed as usize % 2),
+            ..GenerateOptions::default()
+        };
+        let room = scene::generate(&options).unwrap().scene;
+        let report = run(&room, &with(Method::Anytime));
+        let why = report.reason;
+        assert_eq!(report.outcome, Outcome::Solved, "{seed}: {why:?}");
+    }
+}
+
+#[test]
+fn planning_ahead_keeps_the_users_order() {
+    let text = scene::builtin("paper-41a").unwrap().text;
+    let count = parse("paper-41a", text).objects.len();
+    for (first, then) in [(4, 0), (0, 4), (2, 1)] {
+        assert!(first < count && then < count);
+        let order = format!("\n[[before]]\nfirst = \"{first}.finish\"\nthen = \"{then}.grasp\"\n");
+        let scene = parse("ordered", &format!("{text}{order}"));
+        let (mut finished, mut grasped) = (u64::MAX, 0);
+        let mut watch = |_: &WorldSnapshot, motion: &MotionBatch| {
+            for event in motion.events() {
+                let is =
+                    |kind: EventKind, task: u32| event.kind == kind.code() && event.task == task;
+                if is(EventKind::Completed, first as u32) {
+                    finished = event.time_ns;
+                }
+                if is(EventKind::GraspStarted, then as u32) && grasped == 0 {
+                    grasped = event.time_ns;
+                }
+            }
+            ControlFlow::Continue(())
+        };
+        let report = Simulation::new(&scene, &with(Method::Anytime), 1).run(&mut watch);
+        assert_eq!(report.outcome, Outcome::Solved);
+        assert!(
+            finished <= grasped,
+            "{first} and {then}: {finished} and {grasped}"
+        );
     }
 }

@@ -76,7 +76,7 @@ pub(crate) struct Joint {
 }
 
 impl Joint {
-    /// None if this lattice is no exact model, or has too many points.
+    /// None if this lattice is no exact model or has too many points, or there is a user's order.
     pub(crate) fn new(
         scene: &Scene,
         ground: &mut Ground,
@@ -85,6 +85,7 @@ impl Joint {
         goals: &[Option<Rc<Place>>],
     ) -> Option<Self> {
         let exact = scene.lattice.exact && scene.robot.clearance_m == 0.0;
+        let exact = exact && scene.before.is_empty();
         if !exact || ground.points() >= usize::from(NONE) {
             return None;
         }

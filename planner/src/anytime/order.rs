@@ -9,7 +9,7 @@
 
 use std::rc::Rc;
 
-use scene::{ClassId, Pieces, ROBOT_ALONE, Scene};
+use scene::{ClassId, Event, Pieces, ROBOT_ALONE, Scene};
 use shm_types::capacity::MAX_ROBOTS;
 
 use crate::anytime::ground::{EVER, Ground, Time};
@@ -94,7 +94,25 @@ impl Hops {
                 row.push(read(&field, hop.to.grasp));
             }
         }
-        let before = precedence(scene, ground, &list, &of, homes, start);
+        let mut before = precedence(scene, ground, &list, &of, homes, start);
+        for order in &scene.before {
+            let hop = |(object, event): (usize, Event)| {
+                let (first, end) = of[object];
+                let moves = first < end;
+                moves.then(|| {
+                    if event != Event::Finish {
+                        first
+                    } else {
+                        end - 1
+                    }
+                })
+            };
+            if let (Some(first), Some(then)) = (hop(order.first), hop(order.then))
+                && first != then
+            {
+                before[then].push(first);
+            }
+        }
         Self {
             list,
             of,

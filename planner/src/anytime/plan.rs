@@ -11,7 +11,7 @@
 
 use std::rc::Rc;
 
-use scene::{ROBOT_ALONE, Scene, Vec2};
+use scene::{Event, ROBOT_ALONE, Scene, Vec2};
 
 use crate::anytime::ground::{EVER, Ground, Time, duration};
 use crate::anytime::joint::JointMove;
@@ -67,6 +67,8 @@ struct Rest {
     since: Time,
     /// How often it has been put down.
     turns: u32,
+    /// When it was grasped first.
+    grasped: Option<Time>,
 }
 
 /// A move: which robot brings which object where.
@@ -75,6 +77,8 @@ pub(crate) struct Move {
     pub(crate) robot: usize,
     pub(crate) object: usize,
     pub(crate) to: Rc<Place>,
+    /// When it may be grasped, and released, by the user's own order.
+    pub(crate) after: (Time, Time),
 }
 
 /// The state that a plan starts from.
@@ -176,6 +180,7 @@ impl Plan {
                 place: Rc::clone(place),
                 since: 0,
                 turns: 0,
+                grasped: None,
             });
         }
     }
@@ -282,14 +287,14 @@ impl Plan {
             Leg {
                 class: alone,
                 target: to(alone, rest.place.grasp),
-                then: Then::Grasp(rest.since),
+                then: Then::Grasp(rest.since.max(wanted.after.0)),
                 closed: self.closed_by(&[Some(wanted.object), left]),
                 own: [moved, self.owner(left)],
             },
             Leg {
                 class: carrying,
                 target: to(carrying, wanted.to.grasp),
-                then: Then::Release(clear),
+                then: Then::Release(clear.max(wanted.after.1)),
                 closed: Vec::new(),
                 own: [moved, nobody],
             },
@@ -313,6 +318,26 @@ impl Plan {
             limit: self.limit,
             ignoring_parked,
         }
+    }
+
+    /// When the next move of an object, to a place, may grasp and release it by the user's own
+    /// order, as far as what comes first is committed.
+    pub(crate) fn user_order(&self, scene: &Scene, object: usize, to: Vec2) -> (Time, Time) {
+        let mut after = (0, 0);
+        for order in scene.before.iter().filter(|order| order.then.0 == object) {
+            let rest = &self.rests[order.first.0];
+            let done = match order.first.1 {
+                Event::Start | Event::Grasp => rest.grasped.unwrap_or(0),
+                Event::Finish => rest.since,
+            };
+            let is_last = scene.objects[object].goal == Some(to);
+            match order.then.1 {
+                Event::Start | Event::Grasp => after.0 = after.0.max(done),
+                Event::Finish if is_last => after.1 = after.1.max(done),
+                Event::Finish => {}
+            }
+        }
+        after
     }
 
     /// Takes moves over that are made one at a time, a step of one robot after the other.

@@ -10,7 +10,7 @@
 //! closely as the world allows. Every wait is for something planned earlier, so waits form no
 //! ring. Steps are joined where nothing is waited for, in either direction.
 
-use scene::{CONTACT_M, Scene, Vec2, point};
+use scene::{CONTACT_M, Event, Scene, UserOrder, Vec2, point};
 use shm_types::{Action, Grip, NONE, Schedule, Wait};
 
 use crate::anytime::ground::Ground;
@@ -42,9 +42,12 @@ struct Joined {
 ///
 /// None if it has more actions or waits than a message has room for.
 pub(crate) fn write(scene: &Scene, ground: &Ground, plan: &Plan, out: &mut Schedule) -> Option<()> {
-    let needs: Vec<Vec<Need>> = (plan.tracks().iter().enumerate())
+    let mut needs: Vec<Vec<Need>> = (plan.tracks().iter().enumerate())
         .map(|(robot, track)| needs_of(ground, plan, robot as u32, track))
         .collect();
+    for order in &scene.before {
+        add_user_order(plan, *order, &mut needs);
+    }
     let mut waited: Vec<Vec<bool>> = (plan.tracks().iter())
         .map(|track| vec![false; track.deeds.len() + 1])
         .collect();
@@ -131,6 +134,47 @@ fn needs_of(ground: &Ground, plan: &Plan, robot: u32, track: &Track) -> Vec<Need
         cell = next;
     }
     needs
+}
+
+/// What comes second in the user's order waits for what its robot does after what comes first.
+fn add_user_order(plan: &Plan, order: UserOrder, needs: &mut [Vec<Need>]) {
+    let (Some(first), Some(then)) = (find(plan, order.first), find(plan, order.then)) else {
+        return;
+    };
+    if first.0 == then.0 {
+        return;
+    }
+    let need = Need {
+        // The step that leads there.
+        deed: then.1.saturating_sub(1) as u32,
+        robot: first.0 as u32,
+        until: first.1 as u32 + 1,
+    };
+    let list = &mut needs[then.0];
+    let place = list.partition_point(|other| other.deed <= need.deed);
+    list.insert(place, need);
+}
+
+/// The robot and the deed that are an event of an object: its first grasp, its last release.
+fn find(plan: &Plan, (object, event): (usize, Event)) -> Option<(usize, usize)> {
+    let deeds = (plan.tracks().iter().enumerate()).flat_map(|(robot, track)| {
+        let deeds = track.deeds.iter().enumerate();
+        deeds.map(move |(number, deed)| (robot, number, *deed))
+    });
+    let found = deeds.filter_map(|(robot, number, deed)| match deed {
+        Deed::Grasped(of, _, time) if event != Event::Finish && of as usize == object => {
+            Some((time, robot, number))
+        }
+        Deed::Released(of, time) if event == Event::Finish && of as usize == object => {
+            Some((time, robot, number))
+        }
+        _ => None,
+    });
+    let found = match event {
+        Event::Start | Event::Grasp => found.min(),
+        Event::Finish => found.max(),
+    };
+    found.map(|(_, robot, number)| (robot, number))
 }
 
 fn join(

@@ -14,7 +14,7 @@
 use std::collections::{HashSet, VecDeque};
 use std::rc::Rc;
 
-use scene::{ROBOT_ALONE, Scene};
+use scene::{Event, ROBOT_ALONE, Scene, UserOrder};
 
 use crate::anytime::ground::Ground;
 use crate::anytime::order::Random;
@@ -38,6 +38,10 @@ pub(crate) type Step = (usize, Rc<Place>);
 pub(crate) struct Sequencer {
     homes: Vec<u32>,
     goals: Vec<Option<Rc<Place>>>,
+    /// The user's own order.
+    before: Vec<UserOrder>,
+    /// Where objects are at the start.
+    start: Vec<Rc<Place>>,
     /// Blocked in this round, by cell.
     blocked: Vec<u32>,
     seen: Vec<u32>,
@@ -63,11 +67,18 @@ struct Crossing {
 }
 
 impl Sequencer {
-    pub(crate) fn new(ground: &Ground, homes: &[u32], goals: &[Option<Rc<Place>>]) -> Self {
+    pub(crate) fn new(
+        scene: &Scene,
+        ground: &Ground,
+        homes: &[u32],
+        goals: &[Option<Rc<Place>>],
+    ) -> Self {
         let points = ground.points();
         Self {
             homes: homes.to_vec(),
             goals: goals.to_vec(),
+            before: scene.before.clone(),
+            start: Vec::new(),
             blocked: vec![0; points],
             seen: vec![0; points],
             from: vec![0; points],
@@ -91,6 +102,7 @@ impl Sequencer {
         start: &[Rc<Place>],
         attempt: u64,
     ) -> Option<Vec<Step>> {
+        self.start = start.to_vec();
         self.is_shuffled = attempt > 0;
         self.most_floods = self.floods + FLOODS_PER_ATTEMPT * (1 + attempt / 8);
         for asides in [0, 1, 2, 4, start.len() + 4] {
@@ -132,6 +144,9 @@ impl Sequencer {
             let Some(goal) = self.goals[object].clone() else {
                 continue;
             };
+            if self.is_early(places, object, Event::Finish) {
+                continue;
+            }
             if self.can_move(ground, places, object, &goal)
                 && self.try_step(scene, ground, places, steps, (object, goal), asides)
             {
@@ -189,6 +204,23 @@ impl Sequencer {
             steps.pop();
         }
         done
+    }
+
+    /// Whether the user's order wants something else done before an object is grasped, or
+    /// finished, which comes after that.
+    fn is_early(&self, places: &[Rc<Place>], object: usize, event: Event) -> bool {
+        self.before.iter().any(|order| {
+            let (then, of) = order.then;
+            let (first, done) = order.first;
+            let concerns = then == object && (of == event || of != Event::Finish);
+            let has_moved = self.is_at_goal(first, places)
+                || (self.start[first].at - places[first].at).norm() > scene::CONTACT_M;
+            let is_done = match done {
+                Event::Start | Event::Grasp => has_moved,
+                Event::Finish => self.is_at_goal(first, places),
+            };
+            concerns && !is_done
+        })
     }
 
     fn is_at_goal(&self, object: usize, places: &[Rc<Place>]) -> bool {
@@ -408,7 +440,7 @@ impl Sequencer {
     ) -> Vec<Rc<Place>> {
         let class = ground.carrying[aside];
         let from = Rc::clone(&places[aside]);
-        if !from.is_open() {
+        if !from.is_open() || self.is_early(places, aside, Event::Grasp) {
             return Vec::new();
         }
         // Everything it can be brought to, nearest first.

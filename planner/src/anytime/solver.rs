@@ -112,7 +112,7 @@ impl Solver {
         Some(Self {
             router: Router::new(&ground),
             plan: Plan::new(&ground, homes.clone()),
-            sequencer: Sequencer::new(&ground, &homes, &goals),
+            sequencer: Sequencer::new(scene, &ground, &homes, &goals),
             ground,
             start,
             homes,
@@ -290,6 +290,7 @@ impl Solver {
             robot: robot as usize,
             object: object as usize,
             to: Rc::clone(&hop.to),
+            after: self.plan.user_order(scene, object as usize, hop.to.at),
         };
         let (plan, ground, router) = (&mut self.plan, &mut self.ground, &mut self.router);
         let done = if self.mode.makes_room {
