@@ -59,8 +59,9 @@ pub(crate) struct RunArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Method")]
 pub(crate) struct MethodArgs {
-    /// Which constraints are worked out before a selection and on a failure; `anytime` plans ahead instead
-    #[arg(long, default_value = "grasping-and-restricted", value_parser = named::<Method>(&METHODS))]
+    /// `anytime` plans ahead; the paper's four say which constraints are worked out before a
+    /// selection and on a failure
+    #[arg(long, default_value = Settings::default().method.word(), value_parser = named::<Method>(&METHODS))]
     pub(crate) method: Method,
     /// Hard constraints: each pair tested once, or anew at every event
     #[arg(long, default_value = "cached", value_parser = named::<HardMode>(&["cached", "literal"]))]

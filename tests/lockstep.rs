@@ -136,6 +136,7 @@ fn assert_same(scenario: &str, expected: &[String], found: &[String], who: &str)
 }
 
 const IN_PROCESS: &[&str] = &["--driver", "in-process"];
+const PAPERS: &[&str; 2] = &["--method", "grasping-and-restricted"];
 
 #[test]
 fn processes_reach_the_same_state_at_every_tick_in_every_shipped_room() {
@@ -144,9 +145,11 @@ fn processes_reach_the_same_state_at_every_tick_in_every_shipped_room() {
         if planner::certificate(&scene).is_some() {
             continue;
         }
-        let expected = hashes(scenario.name, IN_PROCESS);
-        let found = hashes(scenario.name, &[]);
-        assert_same(scenario.name, &expected, &found, "nobody delayed");
+        for method in [&["--method", "anytime"], PAPERS] {
+            let expected = hashes(scenario.name, &[IN_PROCESS, method].concat());
+            let found = hashes(scenario.name, method);
+            assert_same(scenario.name, &expected, &found, method[1]);
+        }
     }
 }
 
@@ -154,12 +157,12 @@ fn processes_reach_the_same_state_at_every_tick_in_every_shipped_room() {
 fn whoever_is_slow_the_states_are_the_same() {
     // Tasks fail from the first ticks on in this room, so that questions and answers are slow too.
     let room = "paper-17a";
-    let expected = hashes(room, IN_PROCESS);
+    let expected = hashes(room, &[IN_PROCESS, PAPERS].concat());
     for role in [
         "world", "planner", "recorder", "robot-0", "robot-1", "robot-2", "robot-3",
     ] {
         let delay = format!("{role}=50x30");
-        let found = hashes(room, &["--delay", &delay]);
+        let found = hashes(room, &[&["--delay", delay.as_str()][..], PAPERS].concat());
         assert_same(room, &expected, &found, &delay);
     }
 }

@@ -12,7 +12,7 @@ use std::time::Instant;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use scene::{Draft, ObjectDraft, Problems, Scene, Settings, ShapeDraft};
+use scene::{Draft, Method, ObjectDraft, Problems, Scene, Settings, ShapeDraft};
 use shm_types::{Activity, Outcome};
 use sim::{SimReport, Simulation};
 
@@ -122,7 +122,10 @@ pub fn run(
         }
         progress.step(&format!("{objects} objects, {robots} robots"));
         let scene = hall(objects, robots, options.seed)?;
-        let settings = Settings::default();
+        let settings = Settings {
+            method: Method::GraspingAndRestricted,
+            ..Settings::default()
+        };
         let made = Instant::now();
         let mut simulation = Simulation::new(&scene, &settings, 0);
         let set_up_s = made.elapsed().as_secs_f64();

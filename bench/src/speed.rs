@@ -175,6 +175,8 @@ fn run_in_process(workload: &Workload<'_>) -> Run {
 
 #[cfg(test)]
 mod tests {
+    use scene::Method;
+
     use super::*;
 
     fn scene() -> Scene {
@@ -182,9 +184,16 @@ mod tests {
         scene::parse(e1.text, e1.name).unwrap()
     }
 
+    fn settings() -> Settings {
+        Settings {
+            method: Method::GraspingAndRestricted,
+            ..Settings::default()
+        }
+    }
+
     #[test]
     fn runs_are_repeated_until_there_are_enough_ticks() {
-        let (scene, settings) = (scene(), Settings::default());
+        let (scene, settings) = (scene(), settings());
         let workload = Workload {
             scene: &scene,
             settings: &settings,
@@ -204,7 +213,7 @@ mod tests {
 
     #[test]
     fn a_run_that_fails_ends_the_measurement() {
-        let (scene, settings) = (scene(), Settings::default());
+        let (scene, settings) = (scene(), settings());
         let workload = Workload {
             scene: &scene,
             settings: &settings,
@@ -215,7 +224,7 @@ mod tests {
 
     #[test]
     fn in_process_counts_world_time_and_motion() {
-        let (scene, settings) = (scene(), Settings::default());
+        let (scene, settings) = (scene(), settings());
         let workload = Workload {
             scene: &scene,
             settings: &settings,

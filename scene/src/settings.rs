@@ -176,7 +176,7 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
-            method: Method::GraspingAndRestricted,
+            method: Method::Anytime,
             hard: HardMode::Cached,
             performance: Performance::TransitAndTransfer,
             tick_ns: 10 * NS_PER_MS,

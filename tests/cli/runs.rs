@@ -90,7 +90,7 @@ fn number(value: &Value) -> f64 {
 
 #[test]
 fn a_solved_run_has_every_field_and_its_times_sum_up() {
-    let result = run(0, &["h1"]);
+    let result = run(0, &["h1", "--method", "grasping-and-restricted"]);
     is_complete(&result);
     assert_eq!(result["outcome"], "solved");
     assert_eq!(result["reason"], Value::Null);
@@ -177,9 +177,18 @@ fn an_infeasible_room_is_proved_so_before_anything_runs() {
 
 #[test]
 fn a_swap_is_stuck_and_says_why() {
-    let result = run(5, &["swap"]);
+    let result = run(5, &["swap", "--method", "grasping-and-restricted"]);
     assert_eq!(result["outcome"], "stuck");
     says(result["reason"].as_str().unwrap(), &["cycle"]);
+}
+
+#[test]
+fn unless_told_otherwise_the_planner_plans_ahead() {
+    // Two objects each stand at the other's goal: no order of single moves does it.
+    let result = run(0, &["swap"]);
+    assert_eq!(result["method"], "anytime");
+    assert_eq!(result["options"]["settings"]["method"], "anytime");
+    assert_eq!(result["outcome"], "solved");
 }
 
 #[test]

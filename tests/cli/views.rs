@@ -17,10 +17,10 @@ fn recorded_in(room: &str) -> (TempDir, String) {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("run.mcap");
     let file = path.to_str().unwrap().to_owned();
-    ends_with(
-        0,
-        &["run", room, "--driver", "in-process", "--trace", &file],
-    );
+    // Constraints and waits are those of robots that select.
+    let run = ["run", room, "--method", "grasping-and-restricted"];
+    let driver = ["--driver", "in-process", "--trace", &file];
+    ends_with(0, &[run, driver].concat());
     (directory, file)
 }
 

@@ -177,7 +177,7 @@ mod tests {
     use shm_types::{ControlKind, EventKind, FailureCause, NONE};
 
     use super::*;
-    use crate::testing::{BELOW, Bench, room};
+    use crate::testing::{BELOW, Bench, papers, room};
 
     const OBJECTS: [[[f64; 2]; 2]; 1] = [[[1.0, 1.45], [2.0, 1.45]]];
 
@@ -312,7 +312,7 @@ mod tests {
     fn the_time_limit_ends_a_run() {
         let settings = Settings {
             time_limit_ns: 1_000_000_000,
-            ..Settings::default()
+            ..papers()
         };
         let mut bench = Bench::with(room(&[[1.0, 1.0]], &OBJECTS, BELOW, ""), settings);
         bench.steps(99);

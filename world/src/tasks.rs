@@ -112,7 +112,7 @@ mod tests {
     use scene::Settings;
     use shm_types::{EventKind, FailureCause, Grip, NONE, Phase, TaskStatus};
 
-    use crate::testing::{BELOW, Bench, room};
+    use crate::testing::{BELOW, Bench, papers, room};
 
     const OBJECTS: [[[f64; 2]; 2]; 2] = [[[1.0, 1.45], [2.0, 1.45]], [[5.0, 3.0], [5.0, 5.0]]];
 
@@ -124,7 +124,7 @@ mod tests {
     }
 
     fn carrying() -> Bench {
-        let mut bench = bench(Settings::default());
+        let mut bench = bench(papers());
         bench.claim(0, 0);
         bench.step();
         bench.grasp(0);
@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn an_answered_failure_is_counted_once_and_opens_an_epoch() {
-        let mut bench = bench(Settings::default());
+        let mut bench = bench(papers());
         bench.claim(0, 1);
         bench.step();
         bench.fail(0, 1, FailureCause::Objects, NONE);
@@ -196,7 +196,7 @@ mod tests {
 
     #[test]
     fn two_failures_in_one_tick_open_one_epoch() {
-        let mut bench = bench(Settings::default());
+        let mut bench = bench(papers());
         bench.fail(0, 0, FailureCause::Objects, NONE);
         bench.fail(1, 1, FailureCause::Objects, NONE);
         bench.step();
@@ -207,7 +207,7 @@ mod tests {
     fn a_failure_waits_for_its_answer_or_its_deadline() {
         let settings = Settings {
             answer_deadline_ns: 100_000_000,
-            ..Settings::default()
+            ..papers()
         };
         let mut bench = bench(settings);
         bench.fail(0, 1, FailureCause::Objects, NONE);

@@ -2,7 +2,7 @@
 //!
 //! Responsible for: what all tests of this crate share. Not responsible for: any expectation.
 
-use scene::{Scene, Settings, Vec2};
+use scene::{Method, Scene, Settings, Vec2};
 use shm_types::{
     Activity, Checked, Claim, Command, ConstraintTable, ControlKind, ControlRequest, EventKind,
     EventRecord, Failure, FailureCause, Grip, MotionBatch, NONE, ObjectState, PathRequest, Phase,
@@ -61,9 +61,17 @@ pub(crate) struct Bench {
     pub(crate) silent: Vec<bool>,
 }
 
+/// The paper's method, all else by default.
+pub(crate) fn papers() -> Settings {
+    Settings {
+        method: Method::GraspingAndRestricted,
+        ..Settings::default()
+    }
+}
+
 impl Bench {
     pub(crate) fn new(scene: Scene) -> Self {
-        Self::with(scene, Settings::default())
+        Self::with(scene, papers())
     }
 
     pub(crate) fn with(scene: Scene, settings: Settings) -> Self {

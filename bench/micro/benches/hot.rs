@@ -48,6 +48,7 @@ fn path_search(c: &mut Criterion) {
 fn constraints(c: &mut Criterion) {
     let scene = crowded();
     let settings = Settings {
+        method: Method::GraspingAndRestricted,
         hard: HardMode::Literal,
         ..Settings::default()
     };
@@ -74,7 +75,10 @@ fn constraints(c: &mut Criterion) {
 
 fn selection(c: &mut Criterion) {
     let scene = crowded();
-    let settings = Settings::default();
+    let settings = Settings {
+        method: Method::GraspingAndRestricted,
+        ..Settings::default()
+    };
     let mut snapshot = zeroed::<WorldSnapshot>();
     World::new(&scene, settings.clone(), 0).snapshot_into(&mut snapshot);
     let table = zeroed::<ConstraintTable>();

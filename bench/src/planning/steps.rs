@@ -259,7 +259,10 @@ impl<'a> Workbench<'a> {
     /// One selection by one robot, easy constraints included; the first one, or one that follows.
     fn select(&mut self) -> (Counters, f64) {
         let scene = &self.room.scene;
-        let settings = Settings::default();
+        let settings = Settings {
+            method: Method::GraspingAndRestricted,
+            ..Settings::default()
+        };
         let (selection, snapshot, table) = self.selection.get_or_insert_with(|| {
             let mut snapshot = zeroed();
             World::new(scene, settings.clone(), 0).snapshot_into(&mut snapshot);

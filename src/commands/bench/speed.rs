@@ -6,7 +6,7 @@
 use bench::speed::{self, Report, Run, Speed, Workload};
 use node::options::processes;
 use node::{RunOptions, RunPlan, supervisor};
-use scene::Settings;
+use scene::{Method, Settings};
 use shm_types::Outcome as RunOutcome;
 
 use crate::cli::SpeedArgs;
@@ -21,7 +21,10 @@ pub(crate) fn main(args: &SpeedArgs) -> Outcome {
         let message = format!("{} cannot be solved: {proof}", scene.name);
         return Err(Failure::new(Exit::Infeasible, message));
     }
-    let settings = Settings::default();
+    let settings = Settings {
+        method: Method::GraspingAndRestricted,
+        ..Settings::default()
+    };
     let workload = Workload {
         scene: &scene,
         settings: &settings,
