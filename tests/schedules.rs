@@ -369,13 +369,34 @@ fn actions_that_go_nowhere_are_actions() {
 }
 
 #[test]
-fn without_a_schedule_a_run_is_stuck_and_says_so() {
-    let scene = parse(CORRIDOR);
+fn without_a_plan_a_run_is_stuck_and_says_so() {
+    // A wall from side to side between the object and its goal.
+    let scene = parse(
+        r#"
+        name = "divided"
+        [robot]
+        shape = { box = [0.5, 0.5] }
+        speed = 0.5
+        [object]
+        shape = { box = [0.5, 0.5] }
+        grasp = [0.0, -0.5]
+        [workspace]
+        bounds = [0.0, 0.0, 4.0, 2.0]
+        walls = [{ box = [2.0, 0.0, 2.5, 2.0] }]
+        [[robots]]
+        home = [0.5, 0.5]
+        [[objects]]
+        start = [1.0, 1.5]
+        goal = [3.0, 1.5]
+        "#,
+    );
     let report = Simulation::new(&scene, &settings(), 1)
         .run(&mut |_: &_, _: &_| std::ops::ControlFlow::Continue(()));
     assert_eq!(report.outcome, Outcome::Stuck);
-    assert!(report.reason.unwrap().starts_with("2 tasks wait"));
+    let reason = report.reason.unwrap();
+    assert!(reason.starts_with("no plan exists"), "{reason}");
     for robot in &report.robots {
+        assert_eq!(robot.times.ticks(Activity::Moving), 0);
         assert_eq!(robot.times.ticks(Activity::Computing), report.ticks);
     }
 }
