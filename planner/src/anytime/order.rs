@@ -124,6 +124,12 @@ impl Hops {
         }
     }
 
+    /// Whether an object is moved more than once.
+    pub(crate) fn is_moved_again(&self, object: usize) -> bool {
+        let (first, end) = self.of[object];
+        end > first + 1
+    }
+
     /// The moves of an order, in turn: number of the move, and its robot.
     fn moves_of<'a>(
         &'a self,
@@ -165,30 +171,50 @@ impl Hops {
             .map(|robot| busy[robot].saturating_add(self.back[last[robot]][robot]));
         Some(ends.max().unwrap_or(0))
     }
+}
 
-    /// How long robot `robot` is busy if it makes another move after those of an order: the key
-    /// by which a first order is made.
-    pub(crate) fn done_by(&self, order: &[Item], object: usize, robot: usize) -> Option<Time> {
-        let mut longer: Vec<Item> = order.to_vec();
-        longer.push((object as u32, robot as u32));
-        self.least(&longer)?;
-        self.least_of_robot(&longer, robot)
+/// How far an order has come that is made move by move, with the walls alone.
+pub(crate) struct Clocks {
+    /// By object: its next move.
+    next: Vec<usize>,
+    done: Vec<bool>,
+    /// By robot: how long it is busy, and its last move.
+    busy: Vec<(Time, Option<usize>)>,
+}
+
+impl Clocks {
+    pub(crate) fn new(hops: &Hops) -> Self {
+        Self {
+            next: hops.of.iter().map(|&(first, _)| first).collect(),
+            done: vec![false; hops.list.len()],
+            busy: vec![(0, None); hops.approach.len()],
+        }
     }
 
-    fn least_of_robot(&self, order: &[Item], robot: usize) -> Option<Time> {
-        let mut next = Vec::new();
-        let (mut busy, mut last): (Time, Option<usize>) = (0, None);
-        for (hop, by) in self.moves_of(order, &mut next) {
-            if by == robot {
-                let way = match last {
-                    None => self.approach[robot][hop],
-                    Some(before) => self.between[before][hop],
-                };
-                busy = busy.saturating_add(way).saturating_add(self.transfer[hop]);
-                last = Some(hop);
-            }
-        }
-        Some(busy.saturating_add(self.back[last?][robot]))
+    /// When a robot would be home again after the next move of an object; none if that comes too
+    /// early.
+    pub(crate) fn home_by(&self, hops: &Hops, object: usize, robot: usize) -> Option<Time> {
+        let hop = self.next[object];
+        let early = hops.before[hop].iter().any(|&before| !self.done[before]);
+        let done = self.released_by(hops, hop, robot);
+        (!early).then(|| done.saturating_add(hops.back[hop][robot]))
+    }
+
+    fn released_by(&self, hops: &Hops, hop: usize, robot: usize) -> Time {
+        let (busy, last) = self.busy[robot];
+        let way = match last {
+            None => hops.approach[robot][hop],
+            Some(before) => hops.between[before][hop],
+        };
+        busy.saturating_add(way).saturating_add(hops.transfer[hop])
+    }
+
+    /// Takes note that a robot makes the next move of an object.
+    pub(crate) fn make(&mut self, hops: &Hops, object: usize, robot: usize) {
+        let hop = self.next[object];
+        self.busy[robot] = (self.released_by(hops, hop, robot), Some(hop));
+        self.done[hop] = true;
+        self.next[object] += 1;
     }
 }
 

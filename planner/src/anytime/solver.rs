@@ -11,7 +11,7 @@ use shm_types::Verdict;
 
 use crate::anytime::ground::{EVER, Ground, Time};
 use crate::anytime::joint::{Found, Joint, JointMove};
-use crate::anytime::order::{Hops, Item, Random, change};
+use crate::anytime::order::{Clocks, Hops, Item, Random, change};
 use crate::anytime::plan::{Move, Place, Plan, Start, Track};
 use crate::anytime::route::Router;
 use crate::anytime::sequence::{Sequencer, Step};
@@ -250,16 +250,17 @@ impl Solver {
         self.plan.begin(&self.ground, &self.start, EVER);
         self.plan.leaves_away = self.mode.leaves_away;
         let mut left = sequence.to_vec();
+        let mut clocks = Clocks::new(hops);
         let mut order: Vec<Item> = Vec::new();
         while !left.is_empty() {
             let looked_at = if self.mode.in_turn { 1 } else { left.len() };
             let mut candidates: Vec<(Time, usize, usize)> = Vec::new();
             for (place, &object) in left[..looked_at].iter().enumerate() {
-                if left[..place].contains(&object) {
+                if hops.is_moved_again(object as usize) && left[..place].contains(&object) {
                     continue;
                 }
                 for robot in 0..self.homes.len() {
-                    let done = hops.done_by(&order, object as usize, robot);
+                    let done = clocks.home_by(hops, object as usize, robot);
                     candidates.extend(done.map(|done| (done, place, robot)));
                 }
             }
@@ -268,7 +269,9 @@ impl Solver {
                 self.commit(scene, hops, &order, (left[place], robot as u32))
             });
             let (_, place, robot) = taken?;
-            order.push((left.remove(place), robot as u32));
+            let object = left.remove(place);
+            clocks.make(hops, object as usize, robot);
+            order.push((object, robot as u32));
         }
         let makespan = self
             .plan
