@@ -17,6 +17,9 @@ use crate::anytime::route::Router;
 use crate::anytime::sequence::{Sequencer, Step};
 use crate::anytime::{UNITS_PER_CONFIGURATION, UNITS_PER_INTERVAL};
 
+/// Most distances that are kept: one for each lattice point and place that somebody goes to, 4
+/// bytes each.
+const MOST_DISTANCES: usize = 1 << 28;
 /// Configurations that the complete search looks at in one go.
 const CONFIGURATIONS_PER_SLICE: usize = 5_000;
 /// Orders looked at for each one that is tried.
@@ -92,8 +95,12 @@ pub(crate) struct Solver {
 }
 
 impl Solver {
-    /// None if some home cannot be joined to the lattice.
+    /// None if some home cannot be joined to the lattice, or distances would take too much memory.
     pub(crate) fn new(scene: &Scene, settings: &Settings) -> Option<Self> {
+        let places = 2 * scene.objects.len() + scene.homes.len();
+        if places * scene.lattice.len() > MOST_DISTANCES {
+            return None;
+        }
         let ground = Ground::new(scene, settings);
         let homes: Option<Vec<u32>> = (scene.homes.iter())
             .map(|&home| ground.entry(scene, &[ROBOT_ALONE.0], home, &[]))
