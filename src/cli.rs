@@ -267,6 +267,8 @@ pub(crate) enum Workload {
     Planning(PlanningArgs),
     /// Many robots and objects in one thread: world time per wall time, and who is engaged
     Scale(ScaleArgs),
+    /// Rooms of every kind: which are solved, how near the optimum, beside the paper's methods
+    Solve(SolveArgs),
 }
 
 #[derive(Debug, Args)]
@@ -423,6 +425,54 @@ pub(crate) struct ScaleArgs {
     pub(crate) seed: u64,
     #[command(flatten)]
     pub(crate) output: OutputArgs,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = format!("\
+Every room is run in process with the default method and with the paper's four. R is the optimum were
+nothing ever in the way. Rooms are listed where they are not solved, or where one of the four is faster.
+The complete measurement takes the better part of an hour.
+
+Examples:
+  rearrange bench solve --quick
+  rearrange bench solve --sets generated --rooms 2000 --out results/
+
+{STATUSES}"))]
+pub(crate) struct SolveArgs {
+    /// The paper's rooms and a few generated ones: about a minute
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Generated rooms: densities, 1 to 4 robots, 3 to 12 objects, 0 or 2 extra moves in turn
+    /// [default: 1000, with --quick 24]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
+    pub(crate) rooms: Option<u32>,
+    /// Seeded rooms of the paper's sizes, each with 1 to 4 robots [default: 100, with --quick 0]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    pub(crate) seeded: Option<u32>,
+    /// Which rooms: paper (the six, with 1 to 4 robots), seeded, generated [default: all]
+    #[arg(long, value_name = "SET,…", value_delimiter = ',', value_parser = room_set)]
+    pub(crate) sets: Vec<bench::solve::rooms::Set>,
+    /// Seed of the first generated room, and of the first seeded one
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(0..=1_000_000_000_000))]
+    pub(crate) seed: u64,
+    /// World time after which a run counts as failed, s
+    #[arg(long, value_name = "S", default_value_t = 1800.0, value_parser = number(0.01, 1e7))]
+    pub(crate) max_time: f64,
+    /// Wall time after which a run is given up, between two ticks, s
+    #[arg(long, value_name = "S", default_value_t = 60.0, value_parser = number(0.001, 1e6))]
+    pub(crate) wall_cap: f64,
+    /// Rooms that are run at the same time: results do not depend on it, wall times do
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=1_024))]
+    pub(crate) threads: u32,
+    #[command(flatten)]
+    pub(crate) output: OutputArgs,
+}
+
+/// Parses the name of a set of rooms, for clap.
+fn room_set(text: &str) -> Result<bench::solve::rooms::Set, String> {
+    use bench::solve::rooms::Set;
+    let found = Set::ALL.into_iter().find(|set| set.word() == text);
+    found.ok_or_else(|| format!("must be one of {}", Set::ALL.map(Set::word).join(", ")))
 }
 
 /// Parses a number of objects, for clap.

@@ -16,5 +16,6 @@ pub mod progress;
 pub mod report;
 pub mod results;
 pub mod scale;
+pub mod solve;
 pub mod speed;
 pub mod stats;

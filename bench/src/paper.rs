@@ -176,16 +176,23 @@ pub fn rooms(plan: &Plan, progress: &mut dyn Progress) -> Result<Vec<Room>, Room
         .collect()
 }
 
-fn seeded_room(seed: u64, index: usize) -> Result<Room, RoomError> {
+/// The seeded room of this seed, as options: the paper's floors in turn.
+#[must_use]
+pub fn seeded(seed: u64, index: usize) -> GenerateOptions {
     let (area_m2, walls) = FLOORS[index % FLOORS.len()];
-    let options = GenerateOptions {
+    GenerateOptions {
         seed,
         objects: OBJECTS,
         robots: ROBOTS,
         area_m2,
         walls,
         ..GenerateOptions::default()
-    };
+    }
+}
+
+fn seeded_room(seed: u64, index: usize) -> Result<Room, RoomError> {
+    let options = seeded(seed, index);
+    let area_m2 = options.area_m2;
     let generated = generate(&options).map_err(|source| RoomError::Generate { seed, source })?;
     Ok(Room {
         name: format!("seed-{seed}"),

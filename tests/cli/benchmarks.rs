@@ -209,3 +209,100 @@ fn a_hall_is_run_to_its_end_and_says_who_was_engaged() {
     );
     ends_with(2, &["bench", "scale", "--robots", "4"]);
 }
+
+/// The rows of a table, by the names of its columns.
+fn rows(results: &Value, name: &str) -> Vec<serde_json::Map<String, Value>> {
+    let tables = results["tables"].as_array().unwrap();
+    let table = tables.iter().find(|table| table["name"] == name).unwrap();
+    let columns: Vec<_> = table["columns"].as_array().unwrap().iter().collect();
+    let rows = table["rows"].as_array().unwrap().iter();
+    rows.map(|row| {
+        let names = columns
+            .iter()
+            .map(|column| column["name"].as_str().unwrap().to_owned());
+        names.zip(row.as_array().unwrap().iter().cloned()).collect()
+    })
+    .collect()
+}
+
+#[test]
+fn rooms_are_run_with_every_method_and_the_shares_add_up() {
+    let place = tempfile::tempdir().unwrap();
+    let out = place.path().to_str().unwrap();
+    let words = "bench solve --sets generated --rooms 4 --max-time 600 --out";
+    let arguments: Vec<_> = words.split(' ').chain([out]).collect();
+    let assert = ends_with(0, &arguments);
+    says(
+        &stdout(&assert),
+        &[
+            "ANYTIME",
+            "NOT_GENERATED",
+            "mean makespan at most 1.05",
+            "report.html",
+        ],
+    );
+    let results = results(place.path());
+    assert_eq!(results["partial"], false);
+    let (rooms, runs) = (rows(&results, "rooms"), rows(&results, "runs"));
+    assert_eq!(rooms.len(), 4);
+    let made = rooms
+        .iter()
+        .filter(|room| !room["bound_s"].is_null())
+        .count();
+    assert!(made > 0);
+    assert_eq!(runs.len(), 5 * made);
+    for room in rooms.iter().filter(|room| room["outcome"] == "solved") {
+        let number = |name: &str| room[name].as_f64().unwrap();
+        assert!(number("bound_s") <= number("makespan_s"), "{room:?}");
+        let ratio = number("makespan_s") / number("bound_s");
+        assert!((number("to_bound") - ratio).abs() < 1e-9);
+    }
+    let shares = rows(&results, "shares");
+    let all = shares.iter().find(|row| row["by"] == "all").unwrap();
+    for method in ["anytime", "all", "no-action"] {
+        let solved = runs
+            .iter()
+            .filter(|run| run["method"] == method && run["solved"] == 1.0);
+        let share = solved.count() as f64 / made as f64;
+        assert_eq!(all[method].as_f64().unwrap(), share, "{method}");
+    }
+    for by in ["density", "robots", "objects", "extra moves"] {
+        let of = shares.iter().filter(|row| row["by"] == by);
+        let counts =
+            of.map(|row| row["rooms"].as_f64().unwrap() + row["not_generated"].as_f64().unwrap());
+        assert_eq!(counts.sum::<f64>(), 4.0, "{by}");
+    }
+    let missed = rooms
+        .iter()
+        .filter(|room| !room["bound_s"].is_null() && room["outcome"] != "solved");
+    assert_eq!(rows(&results, "misses").len(), missed.count());
+    for file in [
+        "shares.csv",
+        "ratios.csv",
+        "misses.csv",
+        "slower.csv",
+        "report.html",
+    ] {
+        assert!(place.path().join(file).exists(), "{file}");
+    }
+}
+
+#[test]
+fn a_run_that_takes_too_long_is_given_up_and_told_by_name() {
+    let place = tempfile::tempdir().unwrap();
+    let out = place.path().to_str().unwrap();
+    let words = "bench solve --sets generated --rooms 1 --wall-cap 0.001 --out";
+    let arguments: Vec<_> = words.split(' ').chain([out]).collect();
+    ends_with(0, &arguments);
+    let results = results(place.path());
+    let misses = rows(&results, "misses");
+    assert_eq!(misses.len(), 1);
+    assert_eq!(misses[0]["outcome"], "given-up");
+    says(
+        misses[0]["generate"].as_str().unwrap(),
+        &["--seed 1 ", "--extra-moves"],
+    );
+    assert_eq!(results["findings"][0]["held"], false);
+    let sets = stderr(&ends_with(2, &["bench", "solve", "--sets", "mine"]));
+    says(&sets, &["mine", "paper, seeded, generated"]);
+}

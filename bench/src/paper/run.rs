@@ -87,13 +87,22 @@ pub const fn word(outcome: Outcome) -> &'static str {
 }
 
 /// Times the steps of robots and planner.
-struct Stopwatch {
+pub(crate) struct Stopwatch {
     since: Instant,
     counting: bool,
-    sum_s: f64,
+    /// Wall time of all of them so far, s.
+    pub(crate) sum_s: f64,
 }
 
 impl Stopwatch {
+    pub(crate) fn new() -> Self {
+        Self {
+            since: Instant::now(),
+            counting: false,
+            sum_s: 0.0,
+        }
+    }
+
     fn lap(&mut self, counting: bool) {
         let now = Instant::now();
         if self.counting {
@@ -117,11 +126,7 @@ impl Probe for Stopwatch {
 #[must_use]
 pub fn in_process(scene: &Scene, settings: &Settings) -> Measures {
     let mut simulation = Simulation::new(scene, settings, 0);
-    let mut stopwatch = Stopwatch {
-        since: Instant::now(),
-        counting: false,
-        sum_s: 0.0,
-    };
+    let mut stopwatch = Stopwatch::new();
     while simulation.outcome() == Outcome::Running {
         simulation.tick_probed(&mut stopwatch);
     }

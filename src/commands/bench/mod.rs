@@ -9,6 +9,7 @@ mod latency;
 mod paper;
 mod planning;
 mod scale;
+mod solve;
 mod speed;
 
 use std::path::{Path, PathBuf};
@@ -32,6 +33,7 @@ pub(crate) fn main(workload: &Workload) -> Outcome {
         Workload::Latency(args) => latency::main(args),
         Workload::Planning(args) => planning::main(args),
         Workload::Scale(args) => scale::main(args),
+        Workload::Solve(args) => solve::main(args),
     }
 }
 
