@@ -16,7 +16,7 @@ use scene::{Budget, Method, Scene, Settings};
 use shm_types::capacity::MAX_CONSTRAINTS;
 use shm_types::{
     Checked, ConstraintTable, Counters, HardAnswer, HardRequest, PlannerReport, Schedule,
-    SnapshotHeader, StateHash, Verdict, WorldSnapshot, zeroed,
+    StateHash, Verdict, WorldSnapshot, zeroed,
 };
 
 use crate::anytime::{Anytime, Standing};
@@ -133,7 +133,7 @@ impl Planner {
         let mut budget = Budget::new(units);
         let plans_ahead = self.method.plans_ahead();
         let publish = !plans_ahead && self.work(scene, input.snapshot, &mut budget);
-        let reschedule = plans_ahead && self.plan_ahead(scene, header, &mut budget);
+        let reschedule = plans_ahead && self.plan_ahead(scene, input.snapshot, &mut budget);
         self.counters.units += budget.spent();
         if publish {
             self.write_table(header.tick + 1);
@@ -159,17 +159,30 @@ impl Planner {
 
     /// Goes on planning ahead. Whether a schedule is to be published: it is numbered and dated. A
     /// planner that was started again leaves the robots with the schedule that is in force.
-    fn plan_ahead(&mut self, scene: &Scene, header: &SnapshotHeader, budget: &mut Budget) -> bool {
+    fn plan_ahead(
+        &mut self,
+        scene: &Scene,
+        snapshot: Checked<WorldSnapshot>,
+        budget: &mut Budget,
+    ) -> bool {
+        let header = &snapshot.header;
         let Some(schedule) = self.schedule.as_deref_mut() else {
             return false;
         };
-        if self.schedule_version > 0 || header.schedule_version > 0 {
-            return false;
-        }
-        if let Some(anytime) = &mut self.anytime {
-            self.standing = anytime.advance(scene, budget, &mut self.counters, schedule);
-        }
-        if self.standing != Standing::Written {
+        let in_force = header.schedule_version;
+        let is_due = if self.schedule_version == 0 && in_force == 0 {
+            if let Some(anytime) = &mut self.anytime {
+                self.standing = anytime.advance(scene, budget, &mut self.counters, schedule);
+            }
+            self.standing == Standing::Written
+        } else {
+            let mine = self
+                .anytime
+                .as_ref()
+                .filter(|_| self.schedule_version == in_force);
+            mine.is_some_and(|anytime| anytime.list_more(snapshot.robots(), schedule))
+        };
+        if !is_due {
             return false;
         }
         self.standing = Standing::Idle(Verdict::Open);

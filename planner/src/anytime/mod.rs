@@ -22,8 +22,9 @@ mod solver;
 mod timeline;
 
 use scene::{Budget, Scene, Settings};
-use shm_types::{Counters, Schedule, Verdict};
+use shm_types::{Counters, RobotSchedule, RobotState, Schedule, Verdict};
 
+use crate::anytime::publish::Script;
 use crate::anytime::solver::Solver;
 
 /// Share of the makespan that is spent on improving the plan before anybody moves.
@@ -75,6 +76,8 @@ pub(crate) struct Anytime {
     debt: u64,
     /// Units done in all.
     spent: u64,
+    /// The plan as it is published, once it is.
+    script: Option<Script>,
     /// Cells expanded and ways looked for in all.
     cells: u64,
     ways: u64,
@@ -88,6 +91,7 @@ impl Anytime {
             stage: Stage::New,
             debt: 0,
             spent: 0,
+            script: None,
             cells: 0,
             ways: 0,
         }
@@ -120,6 +124,22 @@ impl Anytime {
                 return Standing::Written;
             }
         }
+    }
+
+    /// Lists the actions that come after those in `out`, if some robot has got through half of
+    /// what is listed there and there is more. Whether anything was written.
+    pub(crate) fn list_more(&self, robots: &[RobotState], out: &mut Schedule) -> bool {
+        let Some(script) = &self.script else {
+            return false;
+        };
+        let is_short = |(state, listed): (&RobotState, &RobotSchedule)| {
+            listed.complete == 0 && state.actions >= listed.first + listed.count / 2
+        };
+        let is_due = robots.iter().zip(&out.robots).any(is_short);
+        if is_due {
+            script.write(|robot| robots[robot].actions, out);
+        }
+        is_due
     }
 
     fn work(&mut self, scene: &Scene, counters: &mut Counters, out: &mut Schedule) {
@@ -160,13 +180,18 @@ impl Anytime {
                 }
             }
             Stage::Write => {
-                let written = solver.restore().is_some()
-                    && publish::write(scene, &solver.ground, &solver.plan, out).is_some();
-                Stage::Done(if written {
+                let script =
+                    (solver.restore()).map(|()| Script::of(scene, &solver.ground, &solver.plan));
+                let verdict = if script.is_some() {
                     Verdict::Open
                 } else {
                     Verdict::NotFound
-                })
+                };
+                if let Some(script) = &script {
+                    script.write(|_| 0, out);
+                }
+                self.script = script;
+                Stage::Done(verdict)
             }
             Stage::New | Stage::Done(_) => self.stage,
         };

@@ -11,7 +11,8 @@
 //! ring. Steps are joined where nothing is waited for, in either direction.
 
 use scene::{CONTACT_M, Event, Scene, UserOrder, Vec2, point};
-use shm_types::{Action, Grip, NONE, Schedule, Wait};
+use shm_types::capacity::MAX_ACTIONS;
+use shm_types::{Action, Grip, NONE, RobotSchedule, Schedule, Wait};
 
 use crate::anytime::ground::Ground;
 use crate::anytime::plan::{Deed, Plan, Track};
@@ -38,54 +39,89 @@ struct Joined {
     first: Vec<u32>,
 }
 
-/// Writes all of a plan as the schedule of this version.
-///
-/// None if it has more actions or waits than a message has room for.
-pub(crate) fn write(scene: &Scene, ground: &Ground, plan: &Plan, out: &mut Schedule) -> Option<()> {
-    let mut needs: Vec<Vec<Need>> = (plan.tracks().iter().enumerate())
-        .map(|(robot, track)| needs_of(ground, plan, robot as u32, track))
-        .collect();
-    for order in &scene.before {
-        add_user_order(plan, *order, &mut needs);
-    }
-    let mut waited: Vec<Vec<bool>> = (plan.tracks().iter())
-        .map(|track| vec![false; track.deeds.len() + 1])
-        .collect();
-    for need in needs.iter().flatten() {
-        waited[need.robot as usize][need.until as usize] = true;
-    }
-    let joined: Vec<Joined> = (waited.iter().enumerate())
-        .map(|(robot, waited)| join(scene, ground, plan, robot, &needs[robot], waited))
-        .collect();
-    let (mut actions, mut waits) = (0, 0);
-    out.robot_count = joined.len() as u32;
-    for (robot, part) in joined.iter().enumerate() {
-        let listed = &mut out.robots[robot];
-        listed.first = 0;
-        listed.count = part.actions.len() as u32;
-        listed.offset = actions as u32;
-        listed.complete = 1;
-        let mut needs = needs[robot].iter().peekable();
-        for (index, action) in part.actions.iter().enumerate() {
-            let slot = out.actions.get_mut(actions)?;
-            *slot = *action;
-            slot.first_wait = waits as u32;
-            let last = part.first.get(index + 1).copied().unwrap_or(u32::MAX);
-            while let Some(need) = needs.next_if(|need| need.deed < last) {
-                let granted = &joined[need.robot as usize].granted;
-                *out.waits.get_mut(waits)? = Wait {
-                    robot: need.robot,
-                    actions: granted[(need.until as usize).min(granted.len() - 1)],
-                };
-                waits += 1;
-            }
-            slot.waits = waits as u32 - slot.first_wait;
-            actions += 1;
+/// All that robots will do: by robot its actions, each with what it waits for.
+pub(crate) struct Script {
+    robots: Vec<Vec<(Action, Vec<Wait>)>>,
+}
+
+impl Script {
+    /// The whole of a plan.
+    pub(crate) fn of(scene: &Scene, ground: &Ground, plan: &Plan) -> Self {
+        let mut needs: Vec<Vec<Need>> = (plan.tracks().iter().enumerate())
+            .map(|(robot, track)| needs_of(ground, plan, robot as u32, track))
+            .collect();
+        for order in &scene.before {
+            add_user_order(plan, *order, &mut needs);
+        }
+        let mut waited: Vec<Vec<bool>> = (plan.tracks().iter())
+            .map(|track| vec![false; track.deeds.len() + 1])
+            .collect();
+        for need in needs.iter().flatten() {
+            waited[need.robot as usize][need.until as usize] = true;
+        }
+        let joined: Vec<Joined> = (waited.iter().enumerate())
+            .map(|(robot, waited)| join(scene, ground, plan, robot, &needs[robot], waited))
+            .collect();
+        let script = |(part, needs): (&Joined, &Vec<Need>)| {
+            let mut needs = needs.iter().peekable();
+            let actions = part.actions.iter().enumerate().map(|(index, action)| {
+                let last = part.first.get(index + 1).copied().unwrap_or(u32::MAX);
+                let mut waits = Vec::new();
+                while let Some(need) = needs.next_if(|need| need.deed < last) {
+                    let granted = &joined[need.robot as usize].granted;
+                    waits.push(Wait {
+                        robot: need.robot,
+                        actions: granted[(need.until as usize).min(granted.len() - 1)],
+                    });
+                }
+                (*action, waits)
+            });
+            actions.collect()
+        };
+        Self {
+            robots: joined.iter().zip(&needs).map(script).collect(),
         }
     }
-    out.action_count = actions as u32;
-    out.wait_count = waits as u32;
-    Some(())
+
+    /// Writes the next actions of each robot, from the last one that is granted to it (so many
+    /// are): as many as a message has room for.
+    pub(crate) fn write(&self, granted: impl Fn(usize) -> u32, out: &mut Schedule) {
+        let mut window = MAX_ACTIONS / self.robots.len().max(1);
+        while !self.fits(&granted, window, out) {
+            window /= 2;
+        }
+    }
+
+    fn fits(&self, granted: impl Fn(usize) -> u32, window: usize, out: &mut Schedule) -> bool {
+        let (mut actions, mut waits) = (0, 0);
+        out.robot_count = self.robots.len() as u32;
+        for (robot, script) in self.robots.iter().enumerate() {
+            let first = granted(robot).saturating_sub(1);
+            let ahead = &script[(first as usize).min(script.len())..];
+            let listed = &ahead[..window.min(ahead.len())];
+            out.robots[robot] = RobotSchedule {
+                first,
+                count: listed.len() as u32,
+                offset: actions as u32,
+                complete: u32::from(listed.len() == ahead.len()),
+            };
+            for (action, waited) in listed {
+                let end = waits + waited.len();
+                let Some(room) = out.waits.get_mut(waits..end) else {
+                    return false;
+                };
+                room.copy_from_slice(waited);
+                out.actions[actions] = Action {
+                    first_wait: waits as u32,
+                    waits: waited.len() as u32,
+                    ..*action
+                };
+                (actions, waits) = (actions + 1, end);
+            }
+        }
+        (out.action_count, out.wait_count) = (actions as u32, waits as u32);
+        true
+    }
 }
 
 /// Whom each step of a robot waits for: only what the steps before have not waited for already.
@@ -292,5 +328,70 @@ impl Joined {
         if let Some(action) = self.actions.last_mut() {
             (action.grip, action.object, action.turn) = (grip.code(), object, turn);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use shm_types::capacity::MAX_WAITS;
+    use shm_types::{Point, zeroed};
+
+    use super::*;
+
+    /// A robot with more actions than a message has room for, each with so many waits.
+    fn script(actions: usize, waits: usize) -> Script {
+        let wait = Wait {
+            robot: 0,
+            actions: 0,
+        };
+        let listed = (0..actions).map(|number| {
+            let action = Action {
+                to: Point::new(number as f64, 0.0),
+                grip: Grip::Keep.code(),
+                object: NONE,
+                turn: 0,
+                first_wait: 0,
+                waits: 0,
+                reserved: 0,
+            };
+            (action, vec![wait; waits])
+        });
+        Script {
+            robots: vec![listed.collect()],
+        }
+    }
+
+    #[test]
+    fn a_long_plan_is_listed_from_what_is_granted_as_far_as_there_is_room() {
+        let script = script(MAX_ACTIONS + 100, 0);
+        let mut out: Box<Schedule> = zeroed();
+        for (granted, first, complete) in [(0, 0, 0), (50, 49, 0), (200, 199, 1)] {
+            script.write(|_| granted, &mut out);
+            let listed = out.robots[0];
+            assert_eq!((listed.first, listed.complete), (first, complete));
+            let end = u32::try_from(MAX_ACTIONS + 100).unwrap();
+            let expected = if complete == 1 {
+                end
+            } else {
+                first + MAX_ACTIONS as u32
+            };
+            assert_eq!(listed.first + listed.count, expected);
+            let action = out.action(0, first + 7).unwrap();
+            assert_eq!(action.to.x, f64::from(first + 7), "numbers go on");
+        }
+    }
+
+    #[test]
+    fn where_waits_have_no_room_fewer_actions_are_listed() {
+        let script = script(MAX_ACTIONS, 9);
+        let mut out: Box<Schedule> = zeroed();
+        script.write(|_| 0, &mut out);
+        let count = out.robots[0].count as usize;
+        assert!(
+            count * 9 <= MAX_WAITS && 2 * count * 9 > MAX_WAITS,
+            "{count}"
+        );
+        assert_eq!(out.wait_count as usize, count * 9);
+        assert_eq!(out.robots[0].complete, 0);
     }
 }

@@ -28,6 +28,8 @@ const STUCK_LOOKED_AT: usize = 4;
 const PLACES_TRIED: usize = 3;
 /// Places looked at until that many are found.
 const PLACES_LOOKED_AT: usize = 400;
+/// The same for each object, where that is more: three are needed to move one.
+const FLOODS_PER_OBJECT: u64 = 12;
 /// What a step through an object costs, in steps.
 const PRICE: u32 = 40;
 
@@ -104,7 +106,8 @@ impl Sequencer {
     ) -> Option<Vec<Step>> {
         self.start = start.to_vec();
         self.is_shuffled = attempt > 0;
-        self.most_floods = self.floods + FLOODS_PER_ATTEMPT * (1 + attempt / 8);
+        let least = FLOODS_PER_ATTEMPT.max(FLOODS_PER_OBJECT * start.len() as u64);
+        self.most_floods = self.floods + least * (1 + attempt / 8);
         for asides in [0, 1, 2, 4, start.len() + 4] {
             self.visited.clear();
             let mut places = start.to_vec();

@@ -3,7 +3,8 @@
 //! Responsible for: what is tried next, and which plan is the best so far.
 //! Not responsible for: committing (`plan`), what is published (`publish`).
 
-use std::collections::HashSet;
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashSet};
 use std::rc::Rc;
 
 use scene::{ROBOT_ALONE, Scene, Settings};
@@ -261,21 +262,23 @@ impl Solver {
         let mut order: Vec<Item> = Vec::new();
         while !left.is_empty() {
             let looked_at = if self.mode.in_turn { 1 } else { left.len() };
-            let mut candidates: Vec<(Time, usize, usize)> = Vec::new();
+            let mut candidates = Vec::new();
             for (place, &object) in left[..looked_at].iter().enumerate() {
                 if hops.is_moved_again(object as usize) && left[..place].contains(&object) {
                     continue;
                 }
                 for robot in 0..self.homes.len() {
                     let done = clocks.home_by(hops, object as usize, robot);
-                    candidates.extend(done.map(|done| (done, place, robot)));
+                    candidates.extend(done.map(|done| Reverse((done, place, robot))));
                 }
             }
-            candidates.sort_unstable();
-            let taken = candidates.into_iter().find(|&(_, place, robot)| {
-                self.commit(scene, hops, &order, (left[place], robot as u32))
-            });
-            let (_, place, robot) = taken?;
+            // The soonest first; the others are seldom looked at.
+            let mut candidates = BinaryHeap::from(candidates);
+            let taken =
+                std::iter::from_fn(|| candidates.pop()).find(|&Reverse((_, place, robot))| {
+                    self.commit(scene, hops, &order, (left[place], robot as u32))
+                });
+            let Reverse((_, place, robot)) = taken?;
             let object = left.remove(place);
             clocks.make(hops, object as usize, robot);
             order.push((object, robot as u32));
