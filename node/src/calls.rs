@@ -6,8 +6,10 @@
 //! A server that dies looks connected until somebody cleans up, so whoever asks has a deadline of
 //! its own.
 
+use std::cell::Cell;
 use std::marker::PhantomData;
 use std::ops::Deref;
+use std::time::Duration;
 
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::pending_response::PendingResponse;
@@ -41,7 +43,14 @@ pub(crate) struct CallService<Q: Message, A: Message> {
 pub(crate) struct Client<Q: Message, A: Message> {
     topic: &'static str,
     port: IpcClient<ipc::Service, Wire<Q>, (), Wire<A>, ()>,
+    /// How often the next question is asked again if there is nobody to hear it.
+    patience: Cell<u32>,
 }
+
+/// How often a client asks its first question again if nobody hears it.
+const FIRST_TRIES: u32 = 2_000;
+/// How long it waits in between.
+const AGAIN: Duration = Duration::from_millis(1);
 
 /// Answers.
 pub(crate) struct Server<Q: Message, A: Message> {
@@ -122,6 +131,7 @@ impl<Q: Message, A: Message> CallService<Q, A> {
         Ok(Client {
             topic: self.topic,
             port,
+            patience: Cell::new(FIRST_TRIES),
         })
     }
 
@@ -144,16 +154,27 @@ impl<Q: Message, A: Message> CallService<Q, A> {
     }
 }
 
-impl<Q: Message, A: Message> Client<Q, A> {
+impl<Q: Message + Copy, A: Message> Client<Q, A> {
     /// Asks. At most [`OPEN_CALLS`] calls may be held at once.
     ///
     /// # Errors
     /// Too many calls are held, or shared memory is in no state to carry one.
     pub(crate) fn call(&self, question: Q) -> Result<Call<Q, A>, TopicError> {
-        let pending = self
-            .port
-            .send_copy(Wire(question))
-            .map_err(|e| failed("ask on", self.topic)(&e))?;
+        let ask = || {
+            self.port
+                .send_copy(Wire(question))
+                .map_err(|e| failed("ask on", self.topic)(&e))
+        };
+        let mut pending = ask()?;
+        // A question that reaches nobody is lost. At the start of a run whoever answers may still be
+        // on its way.
+        for _ in 0..self.patience.take() {
+            if pending.number_of_server_connections() > 0 {
+                break;
+            }
+            std::thread::sleep(AGAIN);
+            pending = ask()?;
+        }
         Ok(Call {
             topic: self.topic,
             pending,
