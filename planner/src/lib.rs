@@ -9,7 +9,8 @@
 //!
 //! Everything that may take long is a resumable computation: `begin` copies its inputs once,
 //! `advance` works until it is done or its `Budget` is spent. The outcome and the units are the
-//! same whatever the budgets. After construction nothing allocates.
+//! same whatever the budgets. After construction nothing allocates. `anytime` is an exception to
+//! both.
 //!
 //! Terms: the *initial* place of an object is where it last stood on the ground (rule 9). An
 //! *edge* `before → after` keeps `after` from being selected until `before` is completed

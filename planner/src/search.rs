@@ -23,7 +23,7 @@ use crate::meter::Meter;
 const STRAIGHT_M2: f64 = 1e-12;
 
 /// The directions of `Occupancy::steps`, as columns and rows.
-const DIRECTIONS: [(i32, i32); 8] = [
+pub(crate) const DIRECTIONS: [(i32, i32); 8] = [
     (1, 0),
     (0, 1),
     (-1, 0),

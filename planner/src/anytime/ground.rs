@@ -18,23 +18,12 @@ use shm_types::Counters;
 
 use crate::field::DistanceField;
 use crate::frontier::{DIAGONAL, STRAIGHT};
+use crate::search::DIRECTIONS;
 
 /// A time, in units of which a straight step takes [`STRAIGHT`].
 pub(crate) type Time = u32;
 /// After all.
 pub(crate) const EVER: Time = Time::MAX;
-
-/// The directions of [`Occupancy::steps`], as columns and rows.
-pub(crate) const DIRECTIONS: [(i32, i32); 8] = [
-    (1, 0),
-    (0, 1),
-    (-1, 0),
-    (0, -1),
-    (1, 1),
-    (-1, 1),
-    (-1, -1),
-    (1, -1),
-];
 
 /// Ticks that a grip takes beyond its own duration, from standing there to going on: the command,
 /// the snapshot that shows it held, the next request.

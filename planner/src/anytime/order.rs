@@ -9,6 +9,8 @@
 
 use std::rc::Rc;
 
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
 use scene::{ClassId, Event, Pieces, ROBOT_ALONE, Scene};
 use shm_types::capacity::MAX_ROBOTS;
 
@@ -285,39 +287,24 @@ fn precedence(
     before
 }
 
-/// Numbers that look random and are always the same (`SplitMix64`).
-#[derive(Clone, Debug)]
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    pub(crate) fn below(&mut self, count: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut word = self.0;
-        word = (word ^ (word >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        word = (word ^ (word >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        word ^= word >> 31;
-        ((u128::from(word) * count as u128) >> 64) as usize
-    }
-}
-
 /// Changes an order a little: moves an item elsewhere, exchanges two, or gives one to another
 /// robot.
-pub(crate) fn change(order: &mut Vec<Item>, robots: usize, random: &mut Random) {
+pub(crate) fn change(order: &mut Vec<Item>, robots: usize, random: &mut ChaCha8Rng) {
     let count = order.len();
     if count == 0 {
         return;
     }
-    match random.below(if robots > 1 { 4 } else { 2 }) {
+    match random.random_range(0..if robots > 1 { 4 } else { 2 }) {
         0 => {
-            let item = order.remove(random.below(count));
-            order.insert(random.below(count), item);
+            let item = order.remove(random.random_range(0..count));
+            order.insert(random.random_range(0..count), item);
         }
-        1 => order.swap(random.below(count), random.below(count)),
-        2 => order[random.below(count)].1 = random.below(robots) as u32,
+        1 => order.swap(random.random_range(0..count), random.random_range(0..count)),
+        2 => order[random.random_range(0..count)].1 = random.random_range(0..robots) as u32,
         _ => {
-            let mut item = order.remove(random.below(count));
-            item.1 = random.below(robots) as u32;
-            order.insert(random.below(count), item);
+            let mut item = order.remove(random.random_range(0..count));
+            item.1 = random.random_range(0..robots) as u32;
+            order.insert(random.random_range(0..count), item);
         }
     }
 }

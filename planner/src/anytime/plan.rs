@@ -230,20 +230,8 @@ impl Plan {
         let tail = self.take_tail(ground, robot);
         let found = self.try_from(ground, router, scene, wanted);
         if found.is_none() {
+            // From its end there would be no other way: a way along the tail was looked for too.
             self.put_tail_back(ground, robot, tail);
-            // From the end of the tail, then.
-            if self.tracks[robot].deeds.len() > self.tracks[robot].tail {
-                let track = &mut self.tracks[robot];
-                let before = (track.tail, track.free);
-                track.tail = track.deeds.len();
-                track.free = (track.end.0, track.end.1, None);
-                let found = self.try_from(ground, router, scene, wanted);
-                if found.is_none() {
-                    let track = &mut self.tracks[robot];
-                    (track.tail, track.free) = before;
-                }
-                return found;
-            }
         }
         found
     }
@@ -398,8 +386,9 @@ impl Plan {
                     }
                     Deed::Grasped(object, _, time) => {
                         let class = ground.carrying[object as usize];
-                        self.timeline.leave(ground, &walker, time, number);
-                        walker = self.timeline.enter(ground, owner, class, cell, time);
+                        let up = time - ground.grasp;
+                        self.timeline.leave(ground, &walker, up, number);
+                        walker = self.timeline.enter(ground, owner, class, cell, up);
                     }
                     Deed::Released(_, time) => {
                         self.timeline.leave(ground, &walker, time, number);

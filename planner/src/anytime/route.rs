@@ -13,8 +13,9 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use crate::anytime::ground::{DIRECTIONS, EVER, Field, Ground, Time, duration};
+use crate::anytime::ground::{EVER, Field, Ground, Time, duration};
 use crate::anytime::timeline::{Gap, Owner, Skip, Timeline};
+use crate::search::DIRECTIONS;
 
 /// What the grip does at the end of a leg.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -14,10 +14,12 @@
 use std::collections::{HashSet, VecDeque};
 use std::rc::Rc;
 
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use scene::{Event, ROBOT_ALONE, Scene, UserOrder};
 
 use crate::anytime::ground::Ground;
-use crate::anytime::order::Random;
 use crate::anytime::plan::Place;
 
 /// Floods of the first attempts; later ones may take more.
@@ -51,7 +53,7 @@ pub(crate) struct Sequencer {
     round: u32,
     queue: VecDeque<u32>,
     visited: HashSet<Vec<u32>>,
-    random: Random,
+    random: ChaCha8Rng,
     /// Whether objects are tried in the order of dice.
     is_shuffled: bool,
     most_floods: u64,
@@ -87,7 +89,7 @@ impl Sequencer {
             round: 0,
             queue: VecDeque::new(),
             visited: HashSet::new(),
-            random: Random(7),
+            random: ChaCha8Rng::seed_from_u64(7),
             is_shuffled: false,
             most_floods: 0,
             floods: 0,
@@ -131,9 +133,7 @@ impl Sequencer {
             .filter(|&object| !self.is_at_goal(object, places))
             .collect();
         if self.is_shuffled {
-            for end in (1..open.len()).rev() {
-                open.swap(end, self.random.below(end + 1));
-            }
+            open.shuffle(&mut self.random);
         }
         if open.is_empty() {
             return true;
@@ -175,9 +175,7 @@ impl Sequencer {
             }
             crossed.dedup();
             if self.is_shuffled {
-                for end in (1..crossed.len()).rev() {
-                    crossed.swap(end, self.random.below(end + 1));
-                }
+                crossed.shuffle(&mut self.random);
             }
             for &aside in &crossed {
                 for place in self.asides(scene, ground, places, object, aside, &crossing) {
@@ -469,7 +467,7 @@ impl Sequencer {
         let mut found = Vec::new();
         for with_goals in [true, false] {
             let skipped = if self.is_shuffled {
-                self.random.below(reached.len())
+                self.random.random_range(0..reached.len())
             } else {
                 0
             };

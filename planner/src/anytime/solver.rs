@@ -7,12 +7,14 @@ use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashSet};
 use std::rc::Rc;
 
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use scene::{ROBOT_ALONE, Scene, Settings};
 use shm_types::Verdict;
 
 use crate::anytime::ground::{EVER, Ground, Time};
 use crate::anytime::joint::{Found, Joint, JointMove};
-use crate::anytime::order::{Clocks, Hops, Item, Random, change};
+use crate::anytime::order::{Clocks, Hops, Item, change};
 use crate::anytime::plan::{Move, Place, Plan, Start, Track};
 use crate::anytime::route::Router;
 use crate::anytime::sequence::{Sequencer, Step};
@@ -84,7 +86,7 @@ pub(crate) struct Solver {
     /// Configurations that the complete search has seen.
     configurations: u64,
     hops: Option<Hops>,
-    random: Random,
+    random: ChaCha8Rng,
     best: Option<Best>,
     /// Where orders are looked for: near this one.
     current: Vec<Item>,
@@ -128,7 +130,7 @@ impl Solver {
             joint: None,
             configurations: 0,
             hops: None,
-            random: Random(1),
+            random: ChaCha8Rng::seed_from_u64(1),
             best: None,
             current: Vec::new(),
             misses: 0,
@@ -370,7 +372,7 @@ impl Solver {
             if makespan < best {
                 self.keep(makespan, near);
             }
-        } else if self.random.below(8) == 0 {
+        } else if self.random.random_range(0..8) == 0 {
             self.go_back();
         }
         true
@@ -388,5 +390,54 @@ impl Solver {
         let best = self.best.as_ref()?;
         self.plan.take_over(&self.ground, best.tracks.clone());
         Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// When robots keep others away from where: class, cell, robot, from, to.
+    type Span = (usize, u32, u32, Time, Time);
+
+    fn reserved(solver: &Solver) -> Vec<Span> {
+        let robots = solver.plan.tracks().len();
+        let mut spans: Vec<Span> = Vec::new();
+        for class in 0..solver.ground.classes {
+            for cell in 0..solver.ground.points() as u32 {
+                let busy = solver.plan.timeline().busy(class, cell).iter();
+                let robots = busy.filter(|busy| (busy.owner as usize) < robots);
+                spans.extend(robots.map(|busy| (class, cell, busy.owner, busy.from, busy.to)));
+            }
+        }
+        spans.sort_unstable();
+        // One after the other is one.
+        spans.dedup_by(|next, span| {
+            let goes_on = (next.0, next.1, next.2) == (span.0, span.1, span.2) && next.3 <= span.4;
+            span.4 = if goes_on { span.4.max(next.4) } else { span.4 };
+            goes_on
+        });
+        spans
+    }
+
+    #[test]
+    fn what_is_reserved_after_many_changes_is_what_robots_do_in_the_end() {
+        for seed in 0..6 {
+            let options = scene::GenerateOptions {
+                seed,
+                crowding: 0.8,
+                ..scene::GenerateOptions::default()
+            };
+            let scene = scene::generate(&options).unwrap().scene;
+            let mut solver = Solver::new(&scene, &Settings::default()).unwrap();
+            (0..5).find_map(|attempt| solver.first(&scene, attempt));
+            for _ in 0..10 {
+                solver.improve(&scene);
+                let found = reserved(&solver);
+                let tracks = solver.plan.tracks().to_vec();
+                solver.plan.take_over(&solver.ground, tracks);
+                assert!(found == reserved(&solver), "seed {seed}");
+            }
+        }
     }
 }
