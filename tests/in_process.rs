@@ -373,6 +373,37 @@ fn planning_ahead_solves_random_rooms() {
     }
 }
 
+/// Planners so slow that much is left to improve when robots begin to move.
+#[test]
+fn planning_ahead_improves_the_plan_that_robots_follow() {
+    let mut replaced = 0;
+    for seed in 20..28 {
+        let options = GenerateOptions {
+            seed,
+            objects: 8,
+            area_m2: 30.0,
+            ..GenerateOptions::default()
+        };
+        let room = scene::generate(&options).unwrap().scene;
+        let settings = Settings {
+            units_per_second: 2_000_000,
+            ..with(Method::Anytime)
+        };
+        let (mut version, mut moved) = (0, false);
+        let mut watch = |snapshot: &WorldSnapshot, motion: &MotionBatch| {
+            replaced += u32::from(moved && snapshot.header.schedule_version > version);
+            version = snapshot.header.schedule_version;
+            moved |= motion.motion_count > 0;
+            ControlFlow::Continue(())
+        };
+        let report = Simulation::new(&room, &settings, 1).run(&mut watch);
+        let why = report.reason;
+        assert_eq!(report.outcome, Outcome::Solved, "{seed}: {why:?}");
+        assert_eq!(report.world.schedules_refused, 0, "{seed}");
+    }
+    assert!(replaced > 0, "no better plan came into force under way");
+}
+
 #[test]
 fn planning_ahead_keeps_the_users_order() {
     let text = scene::builtin("paper-41a").unwrap().text;

@@ -44,6 +44,9 @@ pub struct PlannerOutput<'a> {
     pub schedule: Option<&'a Schedule>,
 }
 
+/// Ticks after which a schedule that is not in force was refused.
+const TICKS_TO_ADOPT: u64 = 10;
+
 /// What is being worked on.
 #[derive(Clone, Copy, Debug)]
 enum Job {
@@ -170,23 +173,29 @@ impl Planner {
             return false;
         };
         let in_force = header.schedule_version;
-        let is_due = if self.schedule_version == 0 && in_force == 0 {
-            if let Some(anytime) = &mut self.anytime {
-                self.standing = anytime.advance(scene, budget, &mut self.counters, schedule);
+        let is_due = match &mut self.anytime {
+            None => self.standing == Standing::Written && in_force == 0,
+            // One that was started again leaves robots with what they follow.
+            Some(_) if self.schedule_version == 0 && in_force > 0 => false,
+            Some(anytime) if self.schedule_version == in_force => {
+                if anytime.list_more(snapshot.robots(), schedule) {
+                    true
+                } else {
+                    let counters = &mut self.counters;
+                    self.standing = anytime.advance(scene, snapshot, budget, counters, schedule);
+                    self.standing == Standing::Written
+                }
             }
-            self.standing == Standing::Written
-        } else {
-            let mine = self
-                .anytime
-                .as_ref()
-                .filter(|_| self.schedule_version == in_force);
-            mine.is_some_and(|anytime| anytime.list_more(snapshot.robots(), schedule))
+            Some(anytime) => {
+                let is_late = header.tick > schedule.effect_tick + TICKS_TO_ADOPT;
+                is_late && anytime.take_back(snapshot.robots(), schedule)
+            }
         };
         if !is_due {
             return false;
         }
         self.standing = Standing::Idle(Verdict::Open);
-        schedule.version = header.schedule_version + 1;
+        schedule.version = in_force.max(self.schedule_version) + 1;
         schedule.effect_tick = header.tick + 1;
         self.schedule_version = schedule.version;
         schedule.hash_into(&mut self.journal);

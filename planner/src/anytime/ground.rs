@@ -245,6 +245,10 @@ impl Ground {
         field
     }
 
+    pub(crate) fn time(&self, s: f64) -> Time {
+        (s / self.second_per_unit) as Time
+    }
+
     pub(crate) fn seconds(&self, time: Time) -> f64 {
         f64::from(time) * self.second_per_unit
     }

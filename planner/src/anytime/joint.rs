@@ -18,7 +18,7 @@ use std::rc::Rc;
 use scene::{CONTACT_M, ClassId, ROBOT_ALONE, Scene};
 
 use crate::anytime::ground::{Field, Ground, Mask, Time, offsets_of_resting};
-use crate::anytime::plan::{Place, Start};
+use crate::anytime::track::{Place, Start};
 use crate::frontier::STRAIGHT;
 
 /// Most configurations that are kept.
@@ -131,7 +131,7 @@ impl Joint {
             open: BinaryHeap::new(),
         };
         let mut first = vec![NONE; 3 * homes.len() + objects.len()];
-        for (robot, &cell) in start.robots.iter().enumerate() {
+        for (robot, &cell) in homes.iter().enumerate() {
             first[3 * robot] = cell as u16;
         }
         for (object, place) in start.objects.iter().enumerate() {

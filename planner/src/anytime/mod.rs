@@ -13,6 +13,7 @@
 
 mod ground;
 mod joint;
+mod keep;
 mod order;
 mod plan;
 mod publish;
@@ -20,15 +21,23 @@ mod route;
 mod sequence;
 mod solver;
 mod timeline;
+mod track;
 
 use scene::{Budget, Scene, Settings};
-use shm_types::{Counters, RobotSchedule, RobotState, Schedule, Verdict};
+use shm_types::{Checked, Counters, RobotSchedule, RobotState, Schedule, Verdict, WorldSnapshot};
 
+use crate::anytime::keep::kept;
 use crate::anytime::publish::Script;
 use crate::anytime::solver::Solver;
 
 /// Share of the makespan that is spent on improving the plan before anybody moves.
-const PATIENCE: f64 = 0.015;
+const PATIENCE: f64 = 0.01;
+/// The same while robots follow it, which costs the run nothing.
+const PATIENCE_UNDER_WAY: f64 = 0.03;
+/// World time that improving takes between two looks at where robots are, s.
+const ROUND_S: f64 = 0.25;
+/// From when a round begins until robots may follow what it found, beyond its work, s.
+const REACTION_S: f64 = 0.25;
 /// World time after which no first plan is looked for any more, s.
 const MOST_S: u64 = 60;
 /// Sequences looked for before the complete search begins.
@@ -51,6 +60,11 @@ enum Stage {
     Better(u64),
     /// Writing it down.
     Write,
+    /// Robots follow it; better ones are looked for in rounds, until that many units are spent in
+    /// all.
+    Follow(u64),
+    /// A round, until so many units are spent, and the same.
+    Round(u64, u64),
     /// Nothing.
     Done(Verdict),
 }
@@ -78,6 +92,10 @@ pub(crate) struct Anytime {
     spent: u64,
     /// The plan as it is published, once it is.
     script: Option<Script>,
+    /// The one before, until the new one is in force.
+    replaced: Option<Script>,
+    /// When robots began to follow, ns.
+    begun_ns: Option<u64>,
     /// Cells expanded and ways looked for in all.
     cells: u64,
     ways: u64,
@@ -92,16 +110,19 @@ impl Anytime {
             debt: 0,
             spent: 0,
             script: None,
+            replaced: None,
+            begun_ns: None,
             cells: 0,
             ways: 0,
         }
     }
 
     /// Goes on within `budget`; what is to be published is written to `out`, all but its version
-    /// and tick.
+    /// and tick. Robots follow what was published before, if anything was.
     pub(crate) fn advance(
         &mut self,
         scene: &Scene,
+        snapshot: Checked<WorldSnapshot>,
         budget: &mut Budget,
         counters: &mut Counters,
         out: &mut Schedule,
@@ -114,13 +135,15 @@ impl Anytime {
                 return Standing::Idle(verdict);
             }
             if self.debt > 0 || budget.is_spent() {
-                return Standing::Busy;
+                return match self.script {
+                    None => Standing::Busy,
+                    Some(_) => Standing::Idle(Verdict::Open),
+                };
             }
-            let written = self.stage == Stage::Write;
             let before = self.spent;
-            self.work(scene, counters, out);
+            let is_written = self.work(scene, snapshot, counters, out);
             self.debt += self.spent - before;
-            if written && !matches!(self.stage, Stage::Done(Verdict::NotFound)) {
+            if is_written {
                 return Standing::Written;
             }
         }
@@ -128,7 +151,8 @@ impl Anytime {
 
     /// Lists the actions that come after those in `out`, if some robot has got through half of
     /// what is listed there and there is more. Whether anything was written.
-    pub(crate) fn list_more(&self, robots: &[RobotState], out: &mut Schedule) -> bool {
+    pub(crate) fn list_more(&mut self, robots: &[RobotState], out: &mut Schedule) -> bool {
+        self.replaced = None;
         let Some(script) = &self.script else {
             return false;
         };
@@ -142,22 +166,58 @@ impl Anytime {
         is_due
     }
 
-    fn work(&mut self, scene: &Scene, counters: &mut Counters, out: &mut Schedule) {
+    /// Goes back to the plan before, if the newest was refused. Whether that is to be published.
+    pub(crate) fn take_back(&mut self, robots: &[RobotState], out: &mut Schedule) -> bool {
+        let Some(script) = self.replaced.take() else {
+            return false;
+        };
+        script.write(|robot| robots[robot].actions, out);
+        self.script = Some(script);
+        self.stage = Stage::Done(Verdict::Open);
+        true
+    }
+
+    /// A piece of work. Whether something is to be published.
+    fn work(
+        &mut self,
+        scene: &Scene,
+        snapshot: Checked<WorldSnapshot>,
+        counters: &mut Counters,
+        out: &mut Schedule,
+    ) -> bool {
         if self.stage == Stage::New {
             self.solver = Solver::new(scene, &self.settings).map(Box::new);
             self.stage = Stage::First(0);
-            return;
+            return false;
         }
-        let Some(solver) = self.solver.as_deref_mut() else {
+        let Some(mut solver) = self.solver.take() else {
             self.stage = Stage::Done(Verdict::NotFound);
-            return;
+            return false;
         };
-        let units_per_second = self.settings.units_per_second as f64;
+        let is_written = self.work_with(&mut solver, scene, snapshot, out);
+        counters.cells_expanded += solver.cells() - self.cells;
+        counters.path_plans += solver.ways() - self.ways;
+        (self.cells, self.ways) = (solver.cells(), solver.ways());
+        self.spent = solver.units();
+        self.solver = Some(solver);
+        is_written
+    }
+
+    fn work_with(
+        &mut self,
+        solver: &mut Solver,
+        scene: &Scene,
+        snapshot: Checked<WorldSnapshot>,
+        out: &mut Schedule,
+    ) -> bool {
+        let units_per_second = self.settings.units_per_second;
+        let units = |s: f64| (s * units_per_second as f64) as u64;
         let better = |solver: &Solver, makespan| {
             let worth_s = solver.ground.seconds(makespan) * PATIENCE;
-            Stage::Better(solver.units() + (worth_s * units_per_second) as u64)
+            Stage::Better(solver.units() + units(worth_s))
         };
-        let most = self.settings.units_per_second.saturating_mul(MOST_S);
+        let most = units_per_second.saturating_mul(MOST_S);
+        let mut is_written = false;
         self.stage = match self.stage {
             Stage::First(attempt) => match solver.first(scene, attempt) {
                 Some(makespan) => better(solver, makespan),
@@ -172,32 +232,86 @@ impl Anytime {
                 Some(Err(Verdict::Exhausted)) => Stage::Done(Verdict::Exhausted),
                 Some(Err(_)) => Stage::First(ATTEMPTS_BEFORE_SEARCH),
             },
-            Stage::Better(until) => {
-                if solver.units() < until && solver.improve(scene) {
-                    Stage::Better(until)
+            Stage::Better(until) if solver.units() < until && solver.improve(scene) => self.stage,
+            Stage::Better(_) => Stage::Write,
+            Stage::Write => match solver.restore() {
+                None => Stage::Done(Verdict::NotFound),
+                Some(makespan) => {
+                    let script = Script::of(scene, &solver.ground, &solver.plan, None);
+                    script.write(|_| 0, out);
+                    self.script = Some(script);
+                    is_written = true;
+                    let worth_s = solver.ground.seconds(makespan) * PATIENCE_UNDER_WAY;
+                    Stage::Follow(solver.units() + units(worth_s))
+                }
+            },
+            Stage::Follow(until) if solver.units() < until => {
+                if self.begin_round(solver, scene, snapshot) {
+                    Stage::Round(solver.units() + units(ROUND_S), until)
                 } else {
-                    Stage::Write
+                    Stage::Done(Verdict::Open)
                 }
             }
-            Stage::Write => {
-                let script =
-                    (solver.restore()).map(|()| Script::of(scene, &solver.ground, &solver.plan));
-                let verdict = if script.is_some() {
-                    Verdict::Open
+            Stage::Follow(_) => Stage::Done(Verdict::Open),
+            Stage::Round(until, last) if solver.units() < until && solver.improve(scene) => {
+                Stage::Round(until, last)
+            }
+            Stage::Round(until, last) => {
+                is_written = self.end_round(solver, scene, snapshot, out);
+                if is_written || solver.units() >= until {
+                    Stage::Follow(last)
                 } else {
-                    Verdict::NotFound
-                };
-                if let Some(script) = &script {
-                    script.write(|_| 0, out);
+                    Stage::Done(Verdict::Open)
                 }
-                self.script = script;
-                Stage::Done(verdict)
             }
             Stage::New | Stage::Done(_) => self.stage,
         };
-        counters.cells_expanded += solver.cells() - self.cells;
-        counters.path_plans += solver.ways() - self.ways;
-        (self.cells, self.ways) = (solver.cells(), solver.ways());
-        self.spent = solver.units();
+        is_written
+    }
+
+    /// Begins to look for a better plan that goes on from where robots will be by then. False if
+    /// there is nothing to improve.
+    fn begin_round(
+        &mut self,
+        solver: &mut Solver,
+        scene: &Scene,
+        snapshot: Checked<WorldSnapshot>,
+    ) -> bool {
+        let Some(script) = &self.script else {
+            return false;
+        };
+        let now_ns = snapshot.header.time_ns;
+        let begun_ns = *self.begun_ns.get_or_insert(now_ns);
+        let since_s = (now_ns - begun_ns) as f64 * 1e-9;
+        let until = solver.ground.time(since_s + ROUND_S + REACTION_S);
+        solver.go_on(scene, |tracks| {
+            kept(script, tracks, snapshot.robots(), until)
+        })
+    }
+
+    /// Writes down what a round has found, if that is better and robots can still follow it.
+    fn end_round(
+        &mut self,
+        solver: &mut Solver,
+        scene: &Scene,
+        snapshot: Checked<WorldSnapshot>,
+        out: &mut Schedule,
+    ) -> bool {
+        let Some(script) = &self.script else {
+            return false;
+        };
+        if !solver.has_better() || solver.restore().is_none() {
+            return false;
+        }
+        let better = Script::of(scene, &solver.ground, &solver.plan, Some(script));
+        let robots = snapshot.robots();
+        if !script.agrees(&better, robots) {
+            solver.drop_better();
+            return false;
+        }
+        solver.accept_better();
+        better.write(|robot| robots[robot].actions, out);
+        self.replaced = self.script.replace(better);
+        true
     }
 }

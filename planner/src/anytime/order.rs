@@ -15,8 +15,8 @@ use scene::{ClassId, Event, Pieces, ROBOT_ALONE, Scene};
 use shm_types::capacity::MAX_ROBOTS;
 
 use crate::anytime::ground::{EVER, Ground, Time};
-use crate::anytime::plan::{Place, Start};
 use crate::anytime::sequence::Step;
+use crate::anytime::track::{Place, Rest, Start};
 
 /// An item of an order: an object, and the robot that moves it. An object that is moved several
 /// times goes through its places in turn.
@@ -36,7 +36,9 @@ pub(crate) struct Hops {
     pub(crate) list: Vec<Hop>,
     /// By object: its first move in the list, and the end of its moves.
     pub(crate) of: Vec<(usize, usize)>,
-    /// By robot and move: from where the robot starts to the grasp.
+    /// By robot: when it is free, and how long it takes home from there.
+    free: Vec<(Time, Time)>,
+    /// By robot and move: from where the robot is free to the grasp.
     approach: Vec<Vec<Time>>,
     /// By move and move: from one's release to the other's grasp.
     between: Vec<Vec<Time>>,
@@ -59,9 +61,10 @@ impl Hops {
     ) -> Self {
         let mut list = Vec::new();
         let mut of = Vec::new();
-        for (object, place) in start.objects.iter().enumerate() {
+        let rests = start.rests();
+        for (object, rest) in rests.iter().enumerate() {
             let first = list.len();
-            let mut from = Rc::clone(place);
+            let mut from = Rc::clone(&rest.place);
             for (_, to) in sequence.iter().filter(|(moved, _)| *moved == object) {
                 list.push(Hop {
                     object,
@@ -80,8 +83,8 @@ impl Hops {
         let mut back = vec![Vec::new(); list.len()];
         for hop in &list {
             let field = ground.field(scene, alone, hop.from.grasp);
-            for (robot, &cell) in start.robots.iter().enumerate() {
-                approach[robot].push(read(&field, cell));
+            for (row, track) in approach.iter_mut().zip(&start.robots) {
+                row.push(read(&field, track.free.0));
             }
             for (other, row) in list.iter().zip(&mut between) {
                 row.push(read(&field, other.to.grasp));
@@ -90,13 +93,16 @@ impl Hops {
             let way = read(&field, hop.from.grasp);
             transfer.push(way.saturating_add(ground.grasp + ground.release));
         }
-        for &home in homes {
+        let mut free = Vec::new();
+        for (&home, track) in homes.iter().zip(&start.robots) {
             let field = ground.field(scene, alone, home);
+            let (cell, time, _) = track.free;
+            free.push((time, read(&field, cell)));
             for (hop, row) in list.iter().zip(&mut back) {
                 row.push(read(&field, hop.to.grasp));
             }
         }
-        let mut before = precedence(scene, ground, &list, &of, homes, start);
+        let mut before = precedence(scene, ground, &list, &of, homes, &rests);
         for order in &scene.before {
             let hop = |(object, event): (usize, Event)| {
                 let (first, end) = of[object];
@@ -118,6 +124,7 @@ impl Hops {
         Self {
             list,
             of,
+            free,
             approach,
             between,
             transfer,
@@ -151,7 +158,7 @@ impl Hops {
     /// early.
     pub(crate) fn least(&self, order: &[Item]) -> Option<Time> {
         let mut last = [usize::MAX; MAX_ROBOTS];
-        let mut busy = [0 as Time; MAX_ROBOTS];
+        let mut busy: Vec<Time> = self.free.iter().map(|&(time, _)| time).collect();
         let mut done = vec![false; self.list.len()];
         let mut next = Vec::new();
         for (hop, robot) in self.moves_of(order, &mut next) {
@@ -168,9 +175,12 @@ impl Hops {
                 .saturating_add(self.transfer[hop]);
             last[robot] = hop;
         }
-        let ends = (0..self.approach.len())
-            .filter(|&robot| last[robot] != usize::MAX)
-            .map(|robot| busy[robot].saturating_add(self.back[last[robot]][robot]));
+        let ends = busy.iter().enumerate().map(|(robot, busy)| {
+            busy.saturating_add(match last[robot] {
+                usize::MAX => self.free[robot].1,
+                last => self.back[last][robot],
+            })
+        });
         Some(ends.max().unwrap_or(0))
     }
 }
@@ -189,7 +199,7 @@ impl Clocks {
         Self {
             next: hops.of.iter().map(|&(first, _)| first).collect(),
             done: vec![false; hops.list.len()],
-            busy: vec![(0, None); hops.approach.len()],
+            busy: hops.free.iter().map(|&(time, _)| (time, None)).collect(),
         }
     }
 
@@ -228,7 +238,7 @@ fn precedence(
     list: &[Hop],
     of: &[(usize, usize)],
     homes: &[u32],
-    start: &Start,
+    rests: &[Rest],
 ) -> Vec<Vec<usize>> {
     let mut before = vec![Vec::new(); list.len()];
     for (number, hop) in list.iter().enumerate() {
@@ -274,7 +284,7 @@ fn precedence(
                     }
                 }
             };
-            note(start.objects[object].at, true);
+            note(rests[object].place.at, true);
             if first < end {
                 note(list[end - 1].to.at, false);
             }

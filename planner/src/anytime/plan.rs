@@ -17,77 +17,7 @@ use crate::anytime::ground::{EVER, Ground, Time, duration};
 use crate::anytime::joint::JointMove;
 use crate::anytime::route::{Leg, Piece, Quest, Router, Target, Then};
 use crate::anytime::timeline::{Owner, Timeline};
-use crate::frontier::NOWHERE;
-
-/// A place of one object: at rest there, grasped there.
-#[derive(Clone, Debug)]
-pub(crate) struct Place {
-    /// Centre of the object, m.
-    pub(crate) at: Vec2,
-    /// Where the robot grasps it: the lattice point, or the one next to it; [`NOWHERE`] if no robot
-    /// can stand there.
-    pub(crate) grasp: u32,
-    /// Where it keeps each class of bodies away, sorted.
-    pub(crate) cells: Vec<Vec<u32>>,
-    /// Where it keeps a robot that comes for it away, sorted.
-    pub(crate) bare: Vec<u32>,
-}
-
-/// What a robot does, in order.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Deed {
-    /// A step in a direction, from when to when.
-    Step(u8, Time, Time),
-    /// It has grasped this object, which was put down so often before.
-    Grasped(u32, u32, Time),
-    /// It has put this object down.
-    Released(u32, Time),
-}
-
-/// What a robot does.
-#[derive(Clone, Debug)]
-pub(crate) struct Track {
-    /// Where it begins.
-    pub(crate) start: u32,
-    pub(crate) deeds: Vec<Deed>,
-    /// Where it stands at each grip, m.
-    pub(crate) stops: Vec<Vec2>,
-    /// Deeds from here on are its tail.
-    tail: usize,
-    /// Where and when the tail begins, and the object that was put down there.
-    free: (u32, Time, Option<usize>),
-    /// Where and when it ends.
-    pub(crate) end: (u32, Time),
-}
-
-/// Where an object is left by the last move of it.
-#[derive(Clone, Debug)]
-struct Rest {
-    place: Rc<Place>,
-    since: Time,
-    /// How often it has been put down.
-    turns: u32,
-    /// When it was grasped first.
-    grasped: Option<Time>,
-}
-
-/// A move: which robot brings which object where.
-#[derive(Clone, Debug)]
-pub(crate) struct Move {
-    pub(crate) robot: usize,
-    pub(crate) object: usize,
-    pub(crate) to: Rc<Place>,
-    /// When it may be grasped, and released, by the user's own order.
-    pub(crate) after: (Time, Time),
-}
-
-/// The state that a plan starts from.
-#[derive(Clone, Debug)]
-pub(crate) struct Start {
-    /// Cells of the robots, which hold nothing.
-    pub(crate) robots: Vec<u32>,
-    pub(crate) objects: Vec<Rc<Place>>,
-}
+use crate::anytime::track::{Deed, Move, Place, Rest, Start, Track, grips_in_turn};
 
 /// The plan.
 pub(crate) struct Plan {
@@ -101,40 +31,6 @@ pub(crate) struct Plan {
     limit: Time,
     /// Whether a move may leave its robot elsewhere than at home.
     pub(crate) leaves_away: bool,
-}
-
-impl Place {
-    /// Whether a robot can stand where it is grasped.
-    pub(crate) fn is_open(&self) -> bool {
-        self.grasp != NOWHERE
-    }
-
-    /// The place of `object` with its centre at `at`.
-    pub(crate) fn of(scene: &Scene, ground: &Ground, object: usize, at: Vec2) -> Rc<Self> {
-        let spec = &scene.objects[object];
-        let open_to_empty = spec.pass_under;
-        let cells = (0..ground.classes)
-            .map(|class| {
-                if class == ROBOT_ALONE.0 && open_to_empty {
-                    return Vec::new();
-                }
-                ground.around(scene, class, &spec.shape, at, true)
-            })
-            .collect();
-        let bare = if open_to_empty || scene.lifts_from_below(object) {
-            Vec::new()
-        } else {
-            ground.around(scene, ROBOT_ALONE.0, &spec.shape, at, false)
-        };
-        let classes = [ROBOT_ALONE.0, spec.class.0];
-        let grasp = ground.entry(scene, &classes, scene.grasp_at(object, at), &bare);
-        Rc::new(Self {
-            at,
-            grasp: grasp.unwrap_or(NOWHERE),
-            cells,
-            bare,
-        })
-    }
 }
 
 impl Plan {
@@ -151,37 +47,39 @@ impl Plan {
         }
     }
 
-    /// Nothing committed: everybody stays where it is.
+    /// Nothing committed but what is done whatever is planned.
     pub(crate) fn begin(&mut self, ground: &Ground, start: &Start, limit: Time) {
         self.limit = limit;
         self.timeline.clear();
-        self.tracks.clear();
-        self.rests.clear();
-        for (robot, &cell) in start.robots.iter().enumerate() {
-            let walker = self
-                .timeline
-                .enter(ground, robot as Owner, ROBOT_ALONE.0, cell, 0);
-            self.timeline.leave(ground, &walker, EVER, 0);
-            self.tracks.push(Track {
-                start: cell,
-                deeds: Vec::new(),
-                stops: Vec::new(),
-                tail: 0,
-                free: (cell, 0, None),
-                end: (cell, 0),
-            });
+        self.tracks.clone_from(&start.robots);
+        for (robot, track) in self.tracks.iter().enumerate() {
+            enter(&mut self.timeline, ground, robot as Owner, track);
         }
         for (object, place) in start.objects.iter().enumerate() {
             let owner = self.robots + object as u32;
             for (class, cells) in place.cells.iter().enumerate() {
                 self.timeline.occupy(class, cells, owner, 0);
             }
-            self.rests.push(Rest {
-                place: Rc::clone(place),
-                since: 0,
-                turns: 0,
-                grasped: None,
-            });
+        }
+        for grip in grips_in_turn(&start.robots) {
+            let owner = self.robots + grip.object as u32;
+            for (class, cells) in grip.place.cells.iter().enumerate() {
+                if grip.is_release {
+                    let down = grip.time - ground.release;
+                    self.timeline.occupy(class, cells, owner, down);
+                } else {
+                    let up = grip.time - ground.grasp;
+                    self.timeline.vacate(class, cells, owner, up);
+                }
+            }
+        }
+        self.rests = start.rests();
+        for track in &mut self.tracks {
+            let (cell, time, _) = track.free;
+            let is_around = |rest: &Rest| {
+                rest.since <= time && rest.place.cells[ROBOT_ALONE.0].binary_search(&cell).is_ok()
+            };
+            track.free.2 = self.rests.iter().position(is_around);
         }
     }
 
@@ -329,11 +227,18 @@ impl Plan {
     }
 
     /// Takes moves over that are made one at a time, a step of one robot after the other.
-    pub(crate) fn replay(&mut self, ground: &Ground, start: &Start, moves: &[(usize, JointMove)]) {
-        self.begin(ground, start, EVER);
+    pub(crate) fn replay(
+        &mut self,
+        scene: &Scene,
+        ground: &Ground,
+        start: &Start,
+        moves: &[(usize, JointMove)],
+    ) {
+        let mut start = start.clone();
+        let mut rests = start.rests();
         let mut now = 0;
         for &(robot, made) in moves {
-            let track = &mut self.tracks[robot];
+            let track = &mut start.robots[robot];
             let cell = &mut track.end.0;
             let before = now;
             now += match made {
@@ -341,64 +246,39 @@ impl Plan {
                 JointMove::Grasp(_) => ground.grasp,
                 JointMove::Release(_) => ground.release,
             };
-            match made {
+            let deed = match made {
                 JointMove::Step(direction) => {
                     *cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
-                    track.deeds.push(Deed::Step(direction, before, now));
+                    Deed::Step(direction, before, now)
                 }
                 JointMove::Grasp(object) => {
-                    let turns = self.rests[object as usize].turns;
-                    track.stops.push(ground.at(*cell));
-                    track
-                        .deeds
-                        .push(Deed::Grasped(u32::from(object), turns, now));
+                    let rest = &rests[object as usize];
+                    track.stops.push(Rc::clone(&rest.place));
+                    Deed::Grasped(u32::from(object), rest.turns, now)
                 }
                 JointMove::Release(object) => {
-                    self.rests[object as usize].turns += 1;
-                    track.stops.push(ground.at(*cell));
-                    track.deeds.push(Deed::Released(u32::from(object), now));
+                    let rest = &mut rests[object as usize];
+                    let at = ground.at(*cell) - ground.grasps[object as usize];
+                    rest.place = Place::of(scene, ground, object as usize, at);
+                    rest.turns += 1;
+                    track.stops.push(Rc::clone(&rest.place));
+                    Deed::Released(u32::from(object), now)
                 }
-            }
+            };
+            track.deeds.push(deed);
             track.end.1 = now;
         }
-        let tracks = std::mem::take(&mut self.tracks);
-        self.take_over(ground, tracks);
+        self.begin(ground, &start, EVER);
     }
 
-    /// Takes over what all robots do: enough to publish it, not to commit more.
-    pub(crate) fn take_over(&mut self, ground: &Ground, tracks: Vec<Track>) {
-        self.timeline.clear();
-        self.tracks = tracks;
-        for (robot, track) in self.tracks.iter().enumerate() {
-            let owner = robot as Owner;
-            let alone = ROBOT_ALONE.0;
-            let mut walker = self.timeline.enter(ground, owner, alone, track.start, 0);
-            let mut cell = track.start;
-            for (number, deed) in track.deeds.iter().enumerate() {
-                let number = number as u32;
-                match *deed {
-                    Deed::Step(direction, depart, arrive) => {
-                        let direction = direction as usize;
-                        let span = (depart, arrive);
-                        self.timeline
-                            .step(ground, &mut walker, direction, span, number);
-                        cell = cell.wrapping_add_signed(ground.offsets[direction]);
-                    }
-                    Deed::Grasped(object, _, time) => {
-                        let class = ground.carrying[object as usize];
-                        let up = time - ground.grasp;
-                        self.timeline.leave(ground, &walker, up, number);
-                        walker = self.timeline.enter(ground, owner, class, cell, up);
-                    }
-                    Deed::Released(_, time) => {
-                        self.timeline.leave(ground, &walker, time, number);
-                        walker = self.timeline.enter(ground, owner, alone, cell, time);
-                    }
-                }
-            }
-            let number = track.deeds.len() as u32;
-            self.timeline.leave(ground, &walker, EVER, number);
-        }
+    /// Takes a plan over that began at `start`.
+    pub(crate) fn take_over(&mut self, ground: &Ground, start: &Start, tracks: Vec<Track>) {
+        let objects = start.objects.clone();
+        let whole = Start {
+            robots: tracks,
+            objects,
+        };
+        self.begin(ground, &whole, EVER);
     }
 
     /// As [`Self::commit`]; if parked robots are in the way, they go elsewhere first.
@@ -677,7 +557,7 @@ impl Plan {
                         rest.place = Rc::clone(&wanted.to);
                         rest.since = end;
                         rest.turns += 1;
-                        track.stops.push(wanted.to.at + ground.grasps[object]);
+                        track.stops.push(Rc::clone(&wanted.to));
                         track.deeds.push(Deed::Released(object as u32, end));
                         track.tail = track.deeds.len();
                         track.free = (cell, end, Some(object));
@@ -689,7 +569,7 @@ impl Plan {
                         for (class, cells) in rest.place.cells.iter().enumerate() {
                             self.timeline.vacate(class, cells, id, up);
                         }
-                        track.stops.push(rest.place.at + ground.grasps[object]);
+                        track.stops.push(Rc::clone(&rest.place));
                         track
                             .deeds
                             .push(Deed::Grasped(object as u32, rest.turns, end));
@@ -706,12 +586,32 @@ impl Plan {
     }
 }
 
-impl Deed {
-    /// Direction of a step.
-    pub(crate) fn direction(&self) -> Option<usize> {
-        match self {
-            Self::Step(direction, _, _) => Some(*direction as usize),
-            _ => None,
+/// Enters all that a robot does.
+fn enter(timeline: &mut Timeline, ground: &Ground, owner: Owner, track: &Track) {
+    let alone = ROBOT_ALONE.0;
+    let mut walker = timeline.enter(ground, owner, alone, track.start, 0);
+    let mut cell = track.start;
+    for (number, deed) in track.deeds.iter().enumerate() {
+        let number = number as u32;
+        match *deed {
+            Deed::Step(direction, depart, arrive) => {
+                let direction = direction as usize;
+                let span = (depart, arrive);
+                timeline.step(ground, &mut walker, direction, span, number);
+                cell = cell.wrapping_add_signed(ground.offsets[direction]);
+            }
+            Deed::Grasped(object, _, time) => {
+                let class = ground.carrying[object as usize];
+                let up = time - ground.grasp;
+                timeline.leave(ground, &walker, up, number);
+                walker = timeline.enter(ground, owner, class, cell, up);
+            }
+            Deed::Released(_, time) => {
+                timeline.leave(ground, &walker, time, number);
+                walker = timeline.enter(ground, owner, alone, cell, time);
+            }
         }
     }
+    let number = track.deeds.len() as u32;
+    timeline.leave(ground, &walker, EVER, number);
 }

@@ -12,11 +12,13 @@
 
 use scene::{CONTACT_M, Event, Scene, UserOrder, Vec2, point};
 use shm_types::capacity::MAX_ACTIONS;
-use shm_types::{Action, Grip, NONE, RobotSchedule, Schedule, Wait};
+use shm_types::{Action, Grip, NONE, RobotSchedule, RobotState, Schedule, Wait};
 
 use crate::anytime::ground::Ground;
-use crate::anytime::plan::{Deed, Plan, Track};
+use crate::anytime::keep::ACTIONS_AHEAD;
+use crate::anytime::plan::Plan;
 use crate::anytime::route::sides;
+use crate::anytime::track::{Deed, Track};
 
 /// Most steps in one action.
 const MAX_STEPS: u32 = 20;
@@ -32,6 +34,8 @@ struct Need {
 
 /// Actions of one robot, and which one each deed is part of.
 struct Joined {
+    /// How many come before these, which stay as they were.
+    kept: u32,
     actions: Vec<Action>,
     /// By deed: how many actions are granted once it is.
     granted: Vec<u32>,
@@ -42,11 +46,13 @@ struct Joined {
 /// All that robots will do: by robot its actions, each with what it waits for.
 pub(crate) struct Script {
     robots: Vec<Vec<(Action, Vec<Wait>)>>,
+    /// By robot and deed: how many actions are granted once it is.
+    granted: Vec<Vec<u32>>,
 }
 
 impl Script {
-    /// The whole of a plan.
-    pub(crate) fn of(scene: &Scene, ground: &Ground, plan: &Plan) -> Self {
+    /// The whole of a plan. What robots keep is as `before` has it.
+    pub(crate) fn of(scene: &Scene, ground: &Ground, plan: &Plan, before: Option<&Self>) -> Self {
         let mut needs: Vec<Vec<Need>> = (plan.tracks().iter().enumerate())
             .map(|(robot, track)| needs_of(ground, plan, robot as u32, track))
             .collect();
@@ -60,9 +66,12 @@ impl Script {
             waited[need.robot as usize][need.until as usize] = true;
         }
         let joined: Vec<Joined> = (waited.iter().enumerate())
-            .map(|(robot, waited)| join(scene, ground, plan, robot, &needs[robot], waited))
+            .map(|(robot, waited)| {
+                let kept = before.map(|before| &before.granted[robot][..]);
+                join(scene, ground, plan, robot, &needs[robot], waited, kept)
+            })
             .collect();
-        let script = |(part, needs): (&Joined, &Vec<Need>)| {
+        let script = |(robot, (part, needs)): (usize, (&Joined, &Vec<Need>))| {
             let mut needs = needs.iter().peekable();
             let actions = part.actions.iter().enumerate().map(|(index, action)| {
                 let last = part.first.get(index + 1).copied().unwrap_or(u32::MAX);
@@ -76,11 +85,49 @@ impl Script {
                 }
                 (*action, waits)
             });
-            actions.collect()
+            let kept = before.map_or(&[][..], |before| {
+                &before.robots[robot][..part.kept as usize]
+            });
+            kept.iter().cloned().chain(actions).collect()
         };
         Self {
-            robots: joined.iter().zip(&needs).map(script).collect(),
+            robots: joined.iter().zip(&needs).enumerate().map(script).collect(),
+            granted: joined.into_iter().map(|part| part.granted).collect(),
         }
+    }
+
+    /// By deed of a robot, how many of its actions are granted once it is; at the end, all.
+    pub(crate) fn granted(&self, robot: usize) -> &[u32] {
+        &self.granted[robot]
+    }
+
+    /// What an action waits for.
+    pub(crate) fn waits(&self, robot: usize, action: usize) -> &[Wait] {
+        &self.robots[robot][action].1
+    }
+
+    /// Whether robots may go on with `other` where they are: all that may be granted to them
+    /// before it is in force is the same.
+    pub(crate) fn agrees(&self, other: &Self, robots: &[RobotState]) -> bool {
+        let mut scripts = robots.iter().zip(self.robots.iter().zip(&other.robots));
+        scripts.all(|(state, (mine, others))| {
+            let granted = state.actions as usize;
+            let ahead = (mine.iter().enumerate()).skip(granted.saturating_sub(1));
+            for (number, (action, _)) in ahead.take(1 + ACTIONS_AHEAD as usize) {
+                let known = others.get(number).map(|(known, _)| known);
+                let is_same = |known: &Action| {
+                    known.to == action.to
+                        && (known.grip, known.object) == (action.grip, action.object)
+                };
+                if !known.is_some_and(is_same) {
+                    return false;
+                }
+                if number >= granted && action.grip != Grip::Keep.code() {
+                    break;
+                }
+            }
+            true
+        })
     }
 
     /// Writes the next actions of each robot, from the last one that is granted to it (so many
@@ -144,6 +191,10 @@ fn needs_of(ground: &Ground, plan: &Plan, robot: u32, track: &Track) -> Vec<Need
             }
         };
         let next = cell.wrapping_add_signed(ground.offsets[direction]);
+        if deed < track.kept {
+            cell = next;
+            continue;
+        }
         let mut look = |class: usize, at: u32| {
             for busy in plan.timeline().busy(class, at) {
                 let other = busy.owner as usize;
@@ -177,7 +228,7 @@ fn add_user_order(plan: &Plan, order: UserOrder, needs: &mut [Vec<Need>]) {
     let (Some(first), Some(then)) = (find(plan, order.first), find(plan, order.then)) else {
         return;
     };
-    if first.0 == then.0 {
+    if first.0 == then.0 || then.1 < plan.tracks()[then.0].kept {
         return;
     }
     let need = Need {
@@ -213,6 +264,8 @@ fn find(plan: &Plan, (object, event): (usize, Event)) -> Option<(usize, usize)> 
     found.map(|(_, robot, number)| (robot, number))
 }
 
+/// Joins the steps of a robot after those that it keeps, of which `kept` says how many actions are
+/// granted once they are.
 fn join(
     scene: &Scene,
     ground: &Ground,
@@ -220,21 +273,33 @@ fn join(
     robot: usize,
     needs: &[Need],
     waited: &[bool],
+    kept: Option<&[u32]>,
 ) -> Joined {
     let track = &plan.tracks()[robot];
-    let mut stops = track.stops.iter();
+    let kept = kept.map_or(&[][..], |granted| &granted[..track.kept]);
+    let mut stops = (track.grips()).map(|grip| grip.place.at + ground.grasps[grip.object]);
     let mut joined = Joined {
+        kept: kept.last().copied().unwrap_or(0),
         actions: Vec::new(),
-        granted: Vec::new(),
+        granted: kept.to_vec(),
         first: Vec::new(),
     };
     let mut needs = needs.iter().peekable();
     let mut cell = track.start;
-    let mut steps = 0;
-    let mut heading = None;
     // Where the robot stands beside the lattice, its next way leads to the lattice first.
     let mut beside = !track.deeds.is_empty() && !is_at(scene, cell, scene.homes[robot]);
-    for (deed, done) in track.deeds.iter().enumerate() {
+    for deed in &track.deeds[..kept.len()] {
+        match deed.direction() {
+            Some(direction) => {
+                cell = cell.wrapping_add_signed(ground.offsets[direction]);
+                beside = false;
+            }
+            None => beside = stops.next().is_some_and(|at| !is_at(scene, cell, at)),
+        }
+    }
+    let mut steps = 0;
+    let mut heading = None;
+    for (deed, done) in track.deeds.iter().enumerate().skip(kept.len()) {
         let mut waits = false;
         while needs.next_if(|need| need.deed as usize == deed).is_some() {
             waits = true;
@@ -261,19 +326,13 @@ fn join(
                 heading = Some(direction);
             }
             Deed::Grasped(object, turn, _) => {
-                let from = stops
-                    .next()
-                    .copied()
-                    .unwrap_or_else(|| scene.lattice.at(cell));
+                let from = stops.next().unwrap_or_else(|| scene.lattice.at(cell));
                 beside = joined.stop(deed, scene, cell, from);
                 joined.grip(deed, from, Grip::Grasp, object, turn);
                 heading = None;
             }
             Deed::Released(object, _) => {
-                let to = stops
-                    .next()
-                    .copied()
-                    .unwrap_or_else(|| scene.lattice.at(cell));
+                let to = stops.next().unwrap_or_else(|| scene.lattice.at(cell));
                 beside = joined.stop(deed, scene, cell, to);
                 joined.grip(deed, to, Grip::Release, object, 0);
                 heading = None;
@@ -282,12 +341,16 @@ fn join(
         if waited[deed] {
             heading = None;
         }
-        joined.granted.push(joined.actions.len() as u32);
+        joined
+            .granted
+            .push(joined.kept + joined.actions.len() as u32);
     }
-    if !track.deeds.is_empty() && cell == plan.home(robot) {
+    if track.deeds.len() > kept.len() && cell == plan.home(robot) {
         joined.stop(track.deeds.len(), scene, cell, scene.homes[robot]);
     }
-    joined.granted.push(joined.actions.len() as u32);
+    joined
+        .granted
+        .push(joined.kept + joined.actions.len() as u32);
     joined
 }
 
@@ -358,6 +421,7 @@ mod tests {
         });
         Script {
             robots: vec![listed.collect()],
+            granted: Vec::new(),
         }
     }
 

@@ -20,7 +20,7 @@ use rand_chacha::ChaCha8Rng;
 use scene::{Event, ROBOT_ALONE, Scene, UserOrder};
 
 use crate::anytime::ground::Ground;
-use crate::anytime::plan::Place;
+use crate::anytime::track::Place;
 
 /// Floods of the first attempts; later ones may take more.
 const FLOODS_PER_ATTEMPT: u64 = 2_000;

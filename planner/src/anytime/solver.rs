@@ -15,9 +15,10 @@ use shm_types::Verdict;
 use crate::anytime::ground::{EVER, Ground, Time};
 use crate::anytime::joint::{Found, Joint, JointMove};
 use crate::anytime::order::{Clocks, Hops, Item, change};
-use crate::anytime::plan::{Move, Place, Plan, Start, Track};
+use crate::anytime::plan::Plan;
 use crate::anytime::route::Router;
 use crate::anytime::sequence::{Sequencer, Step};
+use crate::anytime::track::{Move, Place, Start, Track};
 use crate::anytime::{UNITS_PER_CONFIGURATION, UNITS_PER_INTERVAL};
 
 /// Most distances that are kept: one for each lattice point and place that somebody goes to, 4
@@ -31,6 +32,7 @@ const LOOKED_AT: usize = 64;
 const MOST_MISSES: u32 = 30;
 
 /// A plan.
+#[derive(Clone)]
 struct Best {
     makespan: Time,
     /// The order it came from; empty if it is the complete search's own.
@@ -88,6 +90,8 @@ pub(crate) struct Solver {
     hops: Option<Hops>,
     random: ChaCha8Rng,
     best: Option<Best>,
+    /// The one that robots follow.
+    followed: Option<Best>,
     /// Where orders are looked for: near this one.
     current: Vec<Item>,
     /// How often in a row nothing was left to try nearby.
@@ -112,10 +116,7 @@ impl Solver {
         let objects = (scene.objects.iter().enumerate())
             .map(|(object, spec)| Place::of(scene, &ground, object, spec.start))
             .collect();
-        let start = Start {
-            robots: homes.clone(),
-            objects,
-        };
+        let start = Start::new(&homes, objects);
         let goals: Vec<Option<Rc<Place>>> = (scene.objects.iter().enumerate())
             .map(|(object, spec)| Some(Place::of(scene, &ground, object, spec.goal?)))
             .collect();
@@ -132,6 +133,7 @@ impl Solver {
             hops: None,
             random: ChaCha8Rng::seed_from_u64(1),
             best: None,
+            followed: None,
             current: Vec::new(),
             misses: 0,
             tried: HashSet::new(),
@@ -214,7 +216,7 @@ impl Solver {
     /// Takes moves of single robots over: as a sequence that robots may carry out side by side, or
     /// else as they are.
     fn adopt(&mut self, scene: &Scene, moves: Vec<(usize, JointMove)>) -> Time {
-        let mut cells = self.start.robots.clone();
+        let mut cells = self.homes.clone();
         let mut sequence = Vec::new();
         for &(robot, made) in &moves {
             match made {
@@ -233,7 +235,7 @@ impl Solver {
         if let Some(makespan) = self.begin_with(scene, &sequence) {
             return makespan;
         }
-        self.plan.replay(&self.ground, &self.start, &moves);
+        self.plan.replay(scene, &self.ground, &self.start, &moves);
         self.hops = None;
         self.keep(self.plan.makespan(), Vec::new())
     }
@@ -385,11 +387,76 @@ impl Solver {
         }
     }
 
-    /// Puts the best plan in place, to be published.
-    pub(crate) fn restore(&mut self) -> Option<()> {
+    /// Puts the best plan in place, to be published; how long it takes.
+    pub(crate) fn restore(&mut self) -> Option<Time> {
         let best = self.best.as_ref()?;
-        self.plan.take_over(&self.ground, best.tracks.clone());
-        Some(())
+        let tracks = best.tracks.clone();
+        self.plan.take_over(&self.ground, &self.start, tracks);
+        self.followed.get_or_insert_with(|| best.clone());
+        Some(best.makespan)
+    }
+
+    /// Keeps so many deeds of each robot of the plan that is followed, as `kept` says, and looks
+    /// for what comes after them anew. False if nothing comes after them.
+    pub(crate) fn go_on(
+        &mut self,
+        scene: &Scene,
+        kept: impl FnOnce(&[Track]) -> Vec<usize>,
+    ) -> bool {
+        let (Some(followed), Some(hops)) = (self.followed.clone(), self.hops.take()) else {
+            return false;
+        };
+        let kept = kept(&followed.tracks);
+        let turns =
+            |start: &Start| -> Vec<u32> { start.rests().iter().map(|rest| rest.turns).collect() };
+        let before = turns(&self.start);
+        self.start.robots = (followed.tracks.iter().zip(kept))
+            .map(|(track, kept)| track.cut(&self.ground, kept))
+            .collect();
+        // Of each object, the first moves are those kept.
+        let mut kept = turns(&self.start);
+        kept.iter_mut()
+            .zip(&before)
+            .for_each(|(kept, before)| *kept -= before);
+        let mut made = vec![0; kept.len()];
+        let mut order = Vec::new();
+        let mut sequence: Vec<Step> = Vec::new();
+        for &(object, robot) in &followed.order {
+            let index = object as usize;
+            if made[index] >= kept[index] {
+                let hop = hops.of[index].0 + made[index] as usize;
+                order.push((object, robot));
+                sequence.push((index, Rc::clone(&hops.list[hop].to)));
+            }
+            made[index] += 1;
+        }
+        if order.is_empty() {
+            return false;
+        }
+        let (start, homes) = (&self.start, &self.homes);
+        self.hops = Some(Hops::new(scene, &mut self.ground, start, homes, &sequence));
+        self.current.clone_from(&order);
+        self.tried.clear();
+        self.misses = 0;
+        self.best = Some(Best { order, ..followed });
+        self.followed.clone_from(&self.best);
+        true
+    }
+
+    /// Whether the best plan is better than the one that is followed.
+    pub(crate) fn has_better(&self) -> bool {
+        let makespan = |best: &Option<Best>| best.as_ref().map(|best| best.makespan);
+        makespan(&self.best) < makespan(&self.followed)
+    }
+
+    /// Robots follow the best plan from now on.
+    pub(crate) fn accept_better(&mut self) {
+        self.followed.clone_from(&self.best);
+    }
+
+    /// Robots go on as before.
+    pub(crate) fn drop_better(&mut self) {
+        self.best.clone_from(&self.followed);
     }
 }
 
@@ -435,7 +502,7 @@ mod tests {
                 solver.improve(&scene);
                 let found = reserved(&solver);
                 let tracks = solver.plan.tracks().to_vec();
-                solver.plan.take_over(&solver.ground, tracks);
+                solver.plan.take_over(&solver.ground, &solver.start, tracks);
                 assert!(found == reserved(&solver), "seed {seed}");
             }
         }

@@ -1,0 +1,170 @@
+//! What robots keep of a plan that is made anew while they follow it.
+//!
+//! Responsible for: how much each robot keeps, so that it can be carried out to its end whatever
+//! comes after.
+//! Not responsible for: planning what comes after (`solver`), publishing it (`publish`).
+//!
+//! How: each robot keeps what it will have got to by the time the new plan is out, up to the end
+//! of an action, and up to the release if it holds something then. Whatever that waits for is kept
+//! as well. So what is kept waits for nothing else, and leaves robots parked where nothing kept
+//! needs to pass: it is a plan of its own.
+
+use shm_types::{RobotState, Wait};
+
+use crate::anytime::ground::Time;
+use crate::anytime::publish::Script;
+use crate::anytime::track::{Deed, Track};
+
+/// Actions that a robot may be granted before a schedule that is published is in force, if no grip
+/// lies between: one batch, and the next one in the same tick.
+pub(crate) const ACTIONS_AHEAD: u32 = 9;
+
+/// By robot, how many deeds it keeps if everything that begins before `until` is to stay as it is.
+pub(crate) fn kept(
+    script: &Script,
+    tracks: &[Track],
+    robots: &[RobotState],
+    until: Time,
+) -> Vec<usize> {
+    let mut kept = vec![0; tracks.len()];
+    let mut open: Vec<(usize, usize)> = Vec::new();
+    for (robot, (track, state)) in tracks.iter().zip(robots).enumerate() {
+        let granted = script.granted(robot);
+        let begun = track.deeds.partition_point(|deed| deed.begin() < until);
+        let ahead = state.actions + ACTIONS_AHEAD;
+        let asked = granted[..track.deeds.len()].partition_point(|&count| count <= ahead);
+        // Nothing past a grip is asked for before it is done.
+        let grips = track.deeds.iter().enumerate().skip(begun);
+        let grip = grips
+            .filter(|(deed, done)| done.direction().is_none() && granted[*deed] > state.actions)
+            .map(|(deed, _)| deed + 1)
+            .next();
+        let least = begun.max(asked.min(grip.unwrap_or(asked)));
+        open.push((robot, least));
+    }
+    while let Some((robot, least)) = open.pop() {
+        let track = &tracks[robot];
+        let granted = script.granted(robot);
+        let end = end_of_action(track, granted, least);
+        let before = kept[robot];
+        if before >= end {
+            continue;
+        }
+        kept[robot] = end;
+        let actions = before_action(granted, before)..granted[end - 1] as usize;
+        for wait in actions.flat_map(|action| script.waits(robot, action)) {
+            open.push((wait.robot as usize, deeds_for(script, *wait)));
+        }
+        // An object that others have moved before must have been put down.
+        for deed in &track.deeds[before..end] {
+            if let Deed::Grasped(object, turn, _) = *deed
+                && turn > 0
+            {
+                open.extend(put_down(tracks, object, turn));
+            }
+        }
+    }
+    kept
+}
+
+/// How many deeds of a robot are kept if at least `least` are: to the end of an action in which it
+/// holds nothing.
+fn end_of_action(track: &Track, granted: &[u32], least: usize) -> usize {
+    let mut holds = false;
+    for (deed, done) in track.deeds.iter().enumerate() {
+        let ends_before = deed == 0 || granted[deed] > granted[deed - 1];
+        if deed >= least && !holds && ends_before {
+            return deed;
+        }
+        match done {
+            Deed::Step(..) => {}
+            Deed::Grasped(..) => holds = true,
+            Deed::Released(..) => holds = false,
+        }
+    }
+    track.deeds.len()
+}
+
+/// How many actions are kept with the first `kept` deeds.
+fn before_action(granted: &[u32], kept: usize) -> usize {
+    kept.checked_sub(1).map_or(0, |last| granted[last] as usize)
+}
+
+/// How many deeds a robot has to keep for what waits for it.
+fn deeds_for(script: &Script, wait: Wait) -> usize {
+    let granted = script.granted(wait.robot as usize);
+    let deeds = &granted[..granted.len() - 1];
+    deeds
+        .partition_point(|&count| count < wait.actions)
+        .saturating_add(1)
+        .min(deeds.len())
+}
+
+/// Whoever puts an object down for the `turn`-th time, and how many deeds that takes.
+fn put_down(tracks: &[Track], object: u32, turn: u32) -> Option<(usize, usize)> {
+    let mut releases: Vec<(Time, usize, usize)> = Vec::new();
+    for (robot, track) in tracks.iter().enumerate() {
+        for (deed, done) in track.deeds.iter().enumerate() {
+            if let Deed::Released(of, time) = *done
+                && of == object
+            {
+                releases.push((time, robot, deed + 1));
+            }
+        }
+    }
+    releases.sort_unstable();
+    let (_, robot, deeds) = *releases.get(turn as usize - 1)?;
+    Some((robot, deeds))
+}
+
+#[cfg(test)]
+mod tests {
+    use scene::Settings;
+    use shm_types::RobotState;
+
+    use super::*;
+    use crate::anytime::solver::Solver;
+
+    #[test]
+    fn what_is_kept_waits_for_nothing_else_and_ends_with_free_hands() {
+        let mut waited = 0;
+        for seed in 0..6 {
+            let options = scene::GenerateOptions {
+                seed,
+                crowding: 0.8,
+                ..scene::GenerateOptions::default()
+            };
+            let scene = scene::generate(&options).unwrap().scene;
+            let mut solver = Solver::new(&scene, &Settings::default()).unwrap();
+            let makespan = (0..5).find_map(|attempt| solver.first(&scene, attempt));
+            let makespan = makespan.unwrap();
+            solver.restore().unwrap();
+            let script = Script::of(&scene, &solver.ground, &solver.plan, None);
+            let tracks = solver.plan.tracks();
+            for share in 0..10 {
+                let robots = vec![RobotState::default(); tracks.len()];
+                let kept = kept(&script, tracks, &robots, makespan / 10 * share);
+                let actions = |robot: usize| before_action(script.granted(robot), kept[robot]);
+                for (robot, track) in tracks.iter().enumerate() {
+                    let grips = track.deeds[..kept[robot]]
+                        .iter()
+                        .filter(|deed| deed.direction().is_none());
+                    assert_eq!(grips.count() % 2, 0, "{seed}: {robot} holds something");
+                    for action in 0..actions(robot) {
+                        for wait in script.waits(robot, action) {
+                            waited += 1;
+                            let other = wait.robot as usize;
+                            let (actions, kept) = (actions(other), kept[other]);
+                            assert!(
+                                wait.actions as usize <= actions
+                                    || kept == tracks[other].deeds.len(),
+                                "{seed}: {robot} waits for {wait:?}, {actions} are kept"
+                            );
+                        }
+                    }
+                }
+            }
+        }
+        assert!(waited > 0);
+    }
+}

@@ -1,0 +1,246 @@
+//! What robots do in a plan: places, deeds, tracks.
+//!
+//! Responsible for: these words, and what a robot that keeps the beginning of its track goes on
+//! from.
+//! Not responsible for: committing moves (`plan`).
+
+use std::rc::Rc;
+
+use scene::{ROBOT_ALONE, Scene, Vec2};
+
+use crate::anytime::ground::{Ground, Time};
+use crate::frontier::NOWHERE;
+
+/// A place of one object: at rest there, grasped there.
+#[derive(Clone, Debug)]
+pub(crate) struct Place {
+    /// Centre of the object, m.
+    pub(crate) at: Vec2,
+    /// Where the robot grasps it: the lattice point, or the one next to it; [`NOWHERE`] if no robot
+    /// can stand there.
+    pub(crate) grasp: u32,
+    /// Where it keeps each class of bodies away, sorted.
+    pub(crate) cells: Vec<Vec<u32>>,
+    /// Where it keeps a robot that comes for it away, sorted.
+    pub(crate) bare: Vec<u32>,
+}
+
+/// What a robot does, in order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Deed {
+    /// A step in a direction, from when to when.
+    Step(u8, Time, Time),
+    /// It has grasped this object, which was put down so often before.
+    Grasped(u32, u32, Time),
+    /// It has put this object down.
+    Released(u32, Time),
+}
+
+/// What a robot does.
+#[derive(Clone, Debug)]
+pub(crate) struct Track {
+    /// Where it begins.
+    pub(crate) start: u32,
+    pub(crate) deeds: Vec<Deed>,
+    /// Where the object stands at each grip.
+    pub(crate) stops: Vec<Rc<Place>>,
+    /// Deeds before this one stay as they are, whatever else is planned.
+    pub(crate) kept: usize,
+    /// Deeds from here on are its tail.
+    pub(crate) tail: usize,
+    /// Where and when the tail begins, and the object that stands there.
+    pub(crate) free: (u32, Time, Option<usize>),
+    /// Where and when it ends.
+    pub(crate) end: (u32, Time),
+}
+
+/// A move: which robot brings which object where.
+#[derive(Clone, Debug)]
+pub(crate) struct Move {
+    pub(crate) robot: usize,
+    pub(crate) object: usize,
+    pub(crate) to: Rc<Place>,
+    /// When it may be grasped, and released, by the user's own order.
+    pub(crate) after: (Time, Time),
+}
+
+/// What a plan starts from.
+#[derive(Clone, Debug)]
+pub(crate) struct Start {
+    /// By robot, what it does whatever is planned: at first, nothing. It holds nothing after that.
+    pub(crate) robots: Vec<Track>,
+    /// Where objects stand before that.
+    pub(crate) objects: Vec<Rc<Place>>,
+}
+
+/// Where an object is left by the last move of it.
+#[derive(Clone, Debug)]
+pub(crate) struct Rest {
+    pub(crate) place: Rc<Place>,
+    pub(crate) since: Time,
+    /// How often it has been put down.
+    pub(crate) turns: u32,
+    /// When it was grasped first.
+    pub(crate) grasped: Option<Time>,
+}
+
+/// A grip in a track.
+pub(crate) struct GripAt<'a> {
+    pub(crate) time: Time,
+    pub(crate) object: usize,
+    /// Where the object stands then.
+    pub(crate) place: &'a Rc<Place>,
+    pub(crate) is_release: bool,
+}
+
+impl Place {
+    /// Whether a robot can stand where it is grasped.
+    pub(crate) fn is_open(&self) -> bool {
+        self.grasp != NOWHERE
+    }
+
+    /// The place of `object` with its centre at `at`.
+    pub(crate) fn of(scene: &Scene, ground: &Ground, object: usize, at: Vec2) -> Rc<Self> {
+        let spec = &scene.objects[object];
+        let open_to_empty = spec.pass_under;
+        let cells = (0..ground.classes)
+            .map(|class| {
+                if class == ROBOT_ALONE.0 && open_to_empty {
+                    return Vec::new();
+                }
+                ground.around(scene, class, &spec.shape, at, true)
+            })
+            .collect();
+        let bare = if open_to_empty || scene.lifts_from_below(object) {
+            Vec::new()
+        } else {
+            ground.around(scene, ROBOT_ALONE.0, &spec.shape, at, false)
+        };
+        let classes = [ROBOT_ALONE.0, spec.class.0];
+        let grasp = ground.entry(scene, &classes, scene.grasp_at(object, at), &bare);
+        Rc::new(Self {
+            at,
+            grasp: grasp.unwrap_or(NOWHERE),
+            cells,
+            bare,
+        })
+    }
+}
+
+impl Track {
+    /// Nothing done, at this cell.
+    pub(crate) fn parked(cell: u32) -> Self {
+        Self {
+            start: cell,
+            deeds: Vec::new(),
+            stops: Vec::new(),
+            kept: 0,
+            tail: 0,
+            free: (cell, 0, None),
+            end: (cell, 0),
+        }
+    }
+
+    /// Its first `kept` deeds, after which it holds nothing.
+    pub(crate) fn cut(&self, ground: &Ground, kept: usize) -> Self {
+        let deeds = self.deeds[..kept].to_vec();
+        let (mut cell, mut now, mut grips) = (self.start, 0, 0);
+        for deed in &deeds {
+            if let Some(direction) = deed.direction() {
+                cell = cell.wrapping_add_signed(ground.offsets[direction]);
+            } else {
+                grips += 1;
+            }
+            now = deed.end();
+        }
+        Self {
+            start: self.start,
+            deeds,
+            stops: self.stops[..grips].to_vec(),
+            kept,
+            tail: kept,
+            free: (cell, now, None),
+            end: (cell, now),
+        }
+    }
+
+    /// Its grips, in turn.
+    pub(crate) fn grips(&self) -> impl Iterator<Item = GripAt<'_>> {
+        let grips = self.deeds.iter().filter_map(|deed| match *deed {
+            Deed::Step(..) => None,
+            Deed::Grasped(object, _, time) => Some((time, object as usize, false)),
+            Deed::Released(object, time) => Some((time, object as usize, true)),
+        });
+        let places = grips.zip(&self.stops);
+        places.map(|((time, object, is_release), place)| GripAt {
+            time,
+            object,
+            place,
+            is_release,
+        })
+    }
+}
+
+impl Start {
+    /// Everybody where it is, nothing done.
+    pub(crate) fn new(cells: &[u32], objects: Vec<Rc<Place>>) -> Self {
+        Self {
+            robots: cells.iter().map(|&cell| Track::parked(cell)).collect(),
+            objects,
+        }
+    }
+
+    /// Where objects stand after what robots do whatever is planned, and since when.
+    pub(crate) fn rests(&self) -> Vec<Rest> {
+        let mut rests: Vec<Rest> = (self.objects.iter())
+            .map(|place| Rest {
+                place: Rc::clone(place),
+                since: 0,
+                turns: 0,
+                grasped: None,
+            })
+            .collect();
+        for grip in grips_in_turn(&self.robots) {
+            let rest = &mut rests[grip.object];
+            if grip.is_release {
+                rest.place = Rc::clone(grip.place);
+                rest.since = grip.time;
+                rest.turns += 1;
+            } else {
+                rest.grasped.get_or_insert(grip.time);
+            }
+        }
+        rests
+    }
+}
+
+/// The grips of all robots, in turn.
+pub(crate) fn grips_in_turn(tracks: &[Track]) -> Vec<GripAt<'_>> {
+    let mut grips: Vec<GripAt<'_>> = tracks.iter().flat_map(Track::grips).collect();
+    grips.sort_by_key(|grip| grip.time);
+    grips
+}
+
+impl Deed {
+    /// Direction of a step.
+    pub(crate) fn direction(&self) -> Option<usize> {
+        match self {
+            Self::Step(direction, _, _) => Some(*direction as usize),
+            _ => None,
+        }
+    }
+
+    /// When it begins; of a grip, when it is done.
+    pub(crate) fn begin(&self) -> Time {
+        match *self {
+            Self::Step(_, time, _) | Self::Grasped(_, _, time) | Self::Released(_, time) => time,
+        }
+    }
+
+    /// When it is done.
+    pub(crate) fn end(&self) -> Time {
+        match *self {
+            Self::Step(_, _, time) | Self::Grasped(_, _, time) | Self::Released(_, time) => time,
+        }
+    }
+}
