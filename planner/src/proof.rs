@@ -11,11 +11,17 @@
 use std::fmt;
 
 use scene::{Infeasible, Scene};
+use shm_types::Counters;
 
 use crate::certificate::certificate;
 use crate::event::{Event, Precedence};
 use crate::rings::event_ring;
 use crate::store::Store;
+
+/// Most path searches that are worth making for a proof that nobody asked for.
+const MOST_SEARCHES: u64 = 2_000;
+/// And most lattice points that these may come to expand.
+const MOST_CELLS: u64 = 20_000_000;
 
 /// Why a scene has no solution.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,6 +39,22 @@ impl Proof {
         if let Some(certificate) = certificate(scene) {
             return Some(Self::Certificate(certificate));
         }
+        Self::ring(scene, store)
+    }
+
+    /// A proof, if one is found with as many path searches as take about a second, and what they
+    /// took.
+    #[must_use]
+    pub fn search(scene: &Scene) -> (Option<Self>, Counters) {
+        if let Some(certificate) = certificate(scene) {
+            return (Some(Self::Certificate(certificate)), Counters::default());
+        }
+        let searches = MOST_CELLS / (scene.lattice.len() as u64).max(1);
+        let store = Store::of(scene, searches.min(MOST_SEARCHES));
+        (Self::ring(scene, &store), store.work())
+    }
+
+    fn ring(scene: &Scene, store: &Store) -> Option<Self> {
         let orders: Vec<Precedence> = store.precedences().collect();
         event_ring(scene.objects.len(), &orders).map(Self::Ring)
     }

@@ -26,6 +26,8 @@ tag! {
         /// There is none: every arrangement that can be reached was looked at, in the model that
         /// it plans in.
         Exhausted = 2,
+        /// There is none: what every plan has to do contradicts itself.
+        Proved = 3,
     }
 }
 

@@ -5,8 +5,8 @@
 //! Not responsible for: any of these steps.
 
 use node::RunOptions;
-use planner::{BoundLimits, Bounds};
-use scene::{Infeasible, Scene};
+use planner::{BoundLimits, Bounds, Proof};
+use scene::Scene;
 use shm_types::{Outcome as RunOutcome, Verdict};
 use trace::CheckReport;
 
@@ -32,7 +32,7 @@ pub(crate) fn main(args: &RunArgs) -> Outcome {
         ..frame(&scene, args, &options)
     };
     let result = match planner::certificate(&scene) {
-        Some(proof) => infeasible(frame, &proof),
+        Some(certificate) => infeasible(frame, &Proof::Certificate(certificate)),
         None => {
             let finished = drive(&scene, args, options)?;
             complete(frame, &scene, args, finished)
@@ -117,7 +117,7 @@ fn frame(scene: &Scene, args: &RunArgs, options: &RunOptions) -> RunResult {
     }
 }
 
-fn infeasible(frame: RunResult, proof: &Infeasible) -> RunResult {
+fn infeasible(frame: RunResult, proof: &Proof) -> RunResult {
     RunResult {
         outcome: Ending::Infeasible,
         reason: Some(proof.to_string()),
@@ -130,7 +130,7 @@ fn complete(frame: RunResult, scene: &Scene, args: &RunArgs, finished: Finished)
     let times = Times::new(&world.activities, frame.options.run.settings.tick_ns);
     let mean = times.as_ref().map(|times| times.mean);
     let checker = finished.check.as_ref().map(checker);
-    let (outcome, reason) = ending(&finished, checker.as_ref());
+    let (outcome, reason) = ending(scene, &finished, checker.as_ref());
     let bounds = Bounds::of(scene, BoundLimits::default());
     RunResult {
         date: bench::machine::date_utc(),
@@ -191,7 +191,11 @@ fn checker(report: &CheckReport) -> Checker {
 }
 
 /// How it ended, in view of what the checker found.
-fn ending(finished: &Finished, checker: Option<&Checker>) -> (Ending, Option<String>) {
+fn ending(
+    scene: &Scene,
+    finished: &Finished,
+    checker: Option<&Checker>,
+) -> (Ending, Option<String>) {
     let reason = finished.reason.clone();
     let violations = checker.map_or(0, |checker| checker.violations);
     if violations > 0 {
@@ -207,10 +211,13 @@ fn ending(finished: &Finished, checker: Option<&Checker>) -> (Ending, Option<Str
             (Ending::Failed, Some(reason))
         }
         RunOutcome::Solved => (Ending::Solved, reason),
-        RunOutcome::Stuck if finished.world.verdict == Verdict::Exhausted.code() => {
-            (Ending::Infeasible, reason)
-        }
-        RunOutcome::Stuck => (Ending::Stuck, reason),
+        RunOutcome::Stuck => match Proof::search(scene).0 {
+            Some(proof) => (Ending::Infeasible, Some(proof.to_string())),
+            None if finished.world.verdict == Verdict::Exhausted.code() => {
+                (Ending::Infeasible, reason)
+            }
+            None => (Ending::Stuck, reason),
+        },
         RunOutcome::Timeout => (Ending::Timeout, reason),
         RunOutcome::Interrupted => (Ending::Interrupted, reason),
         RunOutcome::Violated => (Ending::Violated, reason),

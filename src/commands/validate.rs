@@ -5,7 +5,7 @@
 
 use std::fmt::Write as _;
 
-use planner::{EasyConstraints, Kind, Places};
+use planner::{EasyConstraints, Kind, Places, Proof};
 use scene::{Budget, Connectivity, ObjectSpec, Scene};
 use shm_types::Counters;
 
@@ -16,7 +16,7 @@ use crate::{output, scenario};
 /// Says ok with a summary, what is wrong (status 3), or why it cannot be solved (status 4).
 pub(crate) fn main(args: &ValidateArgs) -> Outcome {
     let scene = scenario::load(&args.scenario, args.robots)?.scene;
-    if let Some(proof) = planner::certificate(&scene) {
+    if let (Some(proof), _) = Proof::search(&scene) {
         return Err(Failure::new(
             Exit::Infeasible,
             format!("{} cannot be solved: {proof}", scene.name),

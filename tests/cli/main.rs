@@ -7,6 +7,7 @@ mod benchmarks;
 mod explain;
 mod latency;
 mod processes;
+mod proofs;
 mod rooms;
 mod runs;
 mod streams;

@@ -109,6 +109,9 @@ impl World {
                 Verdict::Exhausted => "no plan exists on this lattice: every arrangement that can \
                                        be reached was looked at"
                     .to_owned(),
+                Verdict::Proved => {
+                    "no plan exists: what every plan has to do contradicts itself".to_owned()
+                }
             })
         };
         violation().or_else(overflow).or_else(stuck)

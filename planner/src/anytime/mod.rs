@@ -29,6 +29,7 @@ use shm_types::{Checked, Counters, RobotSchedule, RobotState, Schedule, Verdict,
 use crate::anytime::keep::kept;
 use crate::anytime::publish::Script;
 use crate::anytime::solver::Solver;
+use crate::proof::Proof;
 
 /// Share of the makespan that is spent on improving the plan before anybody moves.
 const PATIENCE: f64 = 0.01;
@@ -54,6 +55,8 @@ enum Stage {
     New,
     /// A first plan: so many attempts were made.
     First(u64),
+    /// A proof that there is none.
+    Prove,
     /// A first plan by the complete search.
     Search,
     /// Better ones, until that many units are spent in all.
@@ -90,6 +93,8 @@ pub(crate) struct Anytime {
     debt: u64,
     /// Units done in all.
     spent: u64,
+    /// What looking for a proof that there is no plan has taken.
+    proving: Counters,
     /// The plan as it is published, once it is.
     script: Option<Script>,
     /// The one before, until the new one is in force.
@@ -109,6 +114,7 @@ impl Anytime {
             stage: Stage::New,
             debt: 0,
             spent: 0,
+            proving: Counters::default(),
             script: None,
             replaced: None,
             begun_ns: None,
@@ -195,10 +201,12 @@ impl Anytime {
             return false;
         };
         let is_written = self.work_with(&mut solver, scene, snapshot, out);
-        counters.cells_expanded += solver.cells() - self.cells;
-        counters.path_plans += solver.ways() - self.ways;
-        (self.cells, self.ways) = (solver.cells(), solver.ways());
-        self.spent = solver.units();
+        let cells = solver.cells() + self.proving.cells_expanded;
+        let ways = solver.ways() + self.proving.path_plans;
+        counters.cells_expanded += cells - self.cells;
+        counters.path_plans += ways - self.ways;
+        (self.cells, self.ways) = (cells, ways);
+        self.spent = solver.units() + self.proving.cells_expanded;
         self.solver = Some(solver);
         is_written
     }
@@ -222,10 +230,18 @@ impl Anytime {
             Stage::First(attempt) => match solver.first(scene, attempt) {
                 Some(makespan) => better(solver, makespan),
                 None if attempt + 1 < ATTEMPTS_BEFORE_SEARCH => Stage::First(attempt + 1),
-                None if attempt + 1 == ATTEMPTS_BEFORE_SEARCH => Stage::Search,
+                None if attempt + 1 == ATTEMPTS_BEFORE_SEARCH => Stage::Prove,
                 None if solver.units() < most => Stage::First(attempt + 1),
                 None => Stage::Done(Verdict::NotFound),
             },
+            Stage::Prove => {
+                let (proof, work) = Proof::search(scene);
+                self.proving = work;
+                match proof {
+                    Some(_) => Stage::Done(Verdict::Proved),
+                    None => Stage::Search,
+                }
+            }
             Stage::Search => match solver.search(scene) {
                 None => Stage::Search,
                 Some(Ok(makespan)) => better(solver, makespan),

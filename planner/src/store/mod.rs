@@ -19,6 +19,7 @@ mod constraint;
 mod ways;
 
 use scene::{Event as Stated, Scene};
+use shm_types::Counters;
 
 use crate::easy;
 use crate::event::{Event, Precedence};
@@ -34,6 +35,7 @@ pub struct Store {
     constraints: Vec<Constraint>,
     impossible: Vec<Leg>,
     is_complete: bool,
+    work: Counters,
 }
 
 impl Store {
@@ -45,6 +47,7 @@ impl Store {
             constraints: Vec::new(),
             impossible: Vec::new(),
             is_complete: true,
+            work: Counters::default(),
         };
         let places: Vec<_> = Places::at_start(scene).collect();
         let is_task = |task: &usize| places[*task].is_some_and(|places| places.is_open());
@@ -65,6 +68,7 @@ impl Store {
             }
         }
         store.is_complete = !ways.is_spent();
+        store.work = ways.work();
         store
     }
 
@@ -84,6 +88,12 @@ impl Store {
     #[must_use]
     pub const fn is_complete(&self) -> bool {
         self.is_complete
+    }
+
+    /// What the searches took that it was found with.
+    #[must_use]
+    pub const fn work(&self) -> Counters {
+        self.work
     }
 
     /// What certainly comes before what: the constraints that leave no choice.

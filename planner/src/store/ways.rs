@@ -24,6 +24,7 @@ pub struct Ways {
     search: PathSearch,
     searches_left: u64,
     is_spent: bool,
+    work: Counters,
 }
 
 impl Ways {
@@ -34,7 +35,14 @@ impl Ways {
             search: PathSearch::new(scene),
             searches_left: searches,
             is_spent: false,
+            work: Counters::default(),
         }
+    }
+
+    /// What the searches took so far.
+    #[must_use]
+    pub const fn work(&self) -> Counters {
+        self.work
     }
 
     /// Whether a search was called for that could not be made.
@@ -168,10 +176,10 @@ impl Ways {
         }
         self.searches_left -= 1;
         self.search.begin(scene, from, to);
-        let (mut budget, mut counters) = (Budget::new(u64::MAX), Counters::default());
+        let mut budget = Budget::new(u64::MAX);
         loop {
             if let std::task::Poll::Ready(length_m) =
-                self.search.advance(scene, &mut budget, &mut counters)
+                self.search.advance(scene, &mut budget, &mut self.work)
             {
                 return Some(length_m.is_some());
             }
