@@ -6,7 +6,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use node::Wait;
 
 use crate::exit::STATUSES;
@@ -196,21 +196,34 @@ pub(crate) struct GenerateArgs {
     /// Number of robots
     #[arg(long, value_name = "M", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=MAX_ROBOTS))]
     pub(crate) robots: u32,
-    /// Free floor, square metres
-    #[arg(long, value_name = "M2", default_value_t = 17.0, value_parser = number(1.0, 10_000.0))]
-    pub(crate) area: f64,
-    /// Number of dividing walls, each with a doorway
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=1_000))]
-    pub(crate) walls: u32,
-    /// Share of places next to other objects or in doorways
-    #[arg(long, value_name = "SHARE", default_value_t = 0.5, value_parser = number(0.0, 1.0))]
-    pub(crate) crowding: f64,
-    /// Moves beyond one an object
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=10_000))]
-    pub(crate) extra_moves: u32,
+    /// Rooms divided by walls, or a warehouse: racks, aisles, robots that lift from below
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) layout: Layout,
+    /// Rooms: free floor, square metres [default: 17]
+    #[arg(long, value_name = "M2", value_parser = number(1.0, 10_000.0))]
+    pub(crate) area: Option<f64>,
+    /// Rooms: number of dividing walls, each with a doorway [default: 3]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1_000))]
+    pub(crate) walls: Option<u32>,
+    /// Rooms: share of places next to other objects or in doorways [default: 0.5]
+    #[arg(long, value_name = "SHARE", value_parser = number(0.0, 1.0))]
+    pub(crate) crowding: Option<f64>,
+    /// Rooms: moves beyond one an object [default: 0]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    pub(crate) extra_moves: Option<u32>,
     /// Write to this file instead of stdout
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
+}
+
+/// What is generated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Layout {
+    /// Rooms divided by walls, objects anywhere
+    #[default]
+    Rooms,
+    /// Racks of pods between aisles, robots that lift them from below
+    Warehouse,
 }
 
 const MAX_OBJECTS: i64 = shm_types::capacity::MAX_OBJECTS as i64;

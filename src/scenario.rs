@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 use std::path::Path;
 
-use scene::{BUILTIN, Scene};
+use scene::{BUILTIN, Builtin, Scene, warehouses};
 
 use crate::exit::{Exit, Failure};
 
@@ -19,6 +19,11 @@ pub(crate) struct Loaded {
     pub(crate) scene: Scene,
     /// Seed it was generated from, if it was.
     pub(crate) seed: Option<u64>,
+}
+
+/// Every built-in scenario, the files first.
+pub(crate) fn shipped() -> impl Iterator<Item = Builtin> {
+    BUILTIN.iter().copied().chain(warehouses())
 }
 
 /// Reads the scenario called `name`, with its first `robots` robots if that is given.
@@ -54,7 +59,7 @@ fn seed(text: &str) -> Option<u64> {
 fn read(name: &str) -> Result<String, Failure> {
     std::fs::read_to_string(name).map_err(|error| {
         let known = if !looks_like_path(name) {
-            let names: Vec<_> = BUILTIN.iter().map(|builtin| builtin.name).collect();
+            let names: Vec<_> = shipped().map(|builtin| builtin.name).collect();
             format!("; built-in scenarios are {}", names.join(", "))
         } else {
             String::new()

@@ -36,10 +36,11 @@ pub mod schema;
 pub mod settings;
 pub mod shape;
 pub mod validate;
+mod warehouse;
 pub mod work;
 
 pub use body::{Body, ClassId, Part, ROBOT_ALONE};
-pub use builtin::{BUILTIN, Builtin, builtin};
+pub use builtin::{BUILTIN, Builtin, builtin, warehouses};
 pub use canonical::to_canonical_toml;
 pub use cspace::Occupancy;
 pub use draft::{Draft, Event, Move, ObjectDraft, RobotDraft, ShapeDraft, UserOrder, WallDraft};
@@ -57,4 +58,5 @@ pub use scene::{ObjectSpec, RobotSpec, Scene};
 pub use schema::json_schema;
 pub use settings::{Compute, HardMode, Method, Performance, Settings};
 pub use shape::{Shape, ShapeError, ShapeOutline};
+pub use warehouse::warehouse;
 pub use work::{Budget, UNITS_PER_OBSTACLE, UNITS_PER_POLYGON_TEST, UNITS_PER_RESET};

@@ -9,10 +9,11 @@ pub const MAX_ROBOTS: usize = 128;
 pub const MAX_PATH_POINTS: usize = 32;
 /// Most hard constraints in force at once.
 pub const MAX_CONSTRAINTS: usize = 16_384;
-/// Most actions in a schedule, of all robots.
-pub const MAX_ACTIONS: usize = 16_384;
+/// Most actions in a schedule, of all robots. Longer plans are listed piece by piece: what is listed
+/// at once is held in shared memory for every reader.
+pub const MAX_ACTIONS: usize = 4_096;
 /// Most waits in a schedule, of all actions.
-pub const MAX_WAITS: usize = 65_536;
+pub const MAX_WAITS: usize = 16_384;
 /// Most pieces of motion in one tick: each robot and what it carries, across three corners.
 pub const MAX_MOTIONS: usize = MAX_ROBOTS * 2 * 4;
 /// Most events in one tick.

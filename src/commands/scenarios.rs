@@ -5,10 +5,11 @@
 use std::fs;
 use std::path::Path;
 
-use scene::{BUILTIN, Builtin};
+use scene::Builtin;
 
 use crate::cli::ScenariosArgs;
 use crate::exit::{Exit, Failure, Outcome};
+use crate::scenario::shipped;
 use crate::{output, table};
 
 /// Lists, prints or writes the built-in scenarios.
@@ -21,9 +22,9 @@ pub(crate) fn main(args: &ScenariosArgs) -> Outcome {
     Ok(Exit::Success)
 }
 
-fn find(name: &str) -> Result<&'static Builtin, Failure> {
+fn find(name: &str) -> Result<Builtin, Failure> {
     scene::builtin(name).ok_or_else(|| {
-        let names: Vec<_> = BUILTIN.iter().map(|builtin| builtin.name).collect();
+        let names: Vec<_> = shipped().map(|builtin| builtin.name).collect();
         Failure::new(
             Exit::Usage,
             format!(
@@ -36,7 +37,7 @@ fn find(name: &str) -> Result<&'static Builtin, Failure> {
 
 fn overview() -> String {
     let mut table = table::plain();
-    for builtin in BUILTIN {
+    for builtin in shipped() {
         table.add_row([builtin.name, &first_sentence(&builtin.about())]);
     }
     table::finish(&table)
@@ -54,7 +55,7 @@ fn write_all(directory: &Path) -> Result<(), Failure> {
         Failure::system(format!("{} cannot be written: {error}", path.display()))
     };
     fs::create_dir_all(directory).map_err(|error| failed(directory, error))?;
-    for builtin in BUILTIN {
+    for builtin in shipped() {
         let path = directory.join(format!("{}.toml", builtin.name));
         fs::write(&path, builtin.text).map_err(|error| failed(&path, error))?;
         output::complain(&format!("wrote {}", path.display()));

@@ -51,7 +51,10 @@ fn a_ring_that_no_overlap_shows_is_told_by_validate_and_by_run() {
         assert_eq!(result["outcome"], "infeasible", "{method}");
         says(result["reason"].as_str().unwrap(), &[ring]);
         let moved = result["makespan_s"].as_f64().unwrap();
-        assert!(moved < 1.0, "{method} ends when it is proved, not after 60 s: {moved}");
+        assert!(
+            moved < 1.0,
+            "{method} ends when it is proved, not after 60 s: {moved}"
+        );
     }
 }
 

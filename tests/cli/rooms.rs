@@ -13,7 +13,8 @@ fn every_built_in_scenario_is_listed_on_a_line_of_its_own() {
         .lines()
         .filter_map(|line| line.split_whitespace().next())
         .collect();
-    let builtin: Vec<_> = scene::BUILTIN.iter().map(|builtin| builtin.name).collect();
+    let shipped = scene::BUILTIN.iter().copied().chain(scene::warehouses());
+    let builtin: Vec<_> = shipped.map(|builtin| builtin.name).collect();
     assert_eq!(names, builtin);
     for line in text.lines() {
         assert!(line.len() > 30, "no description: {line}");
@@ -25,7 +26,8 @@ fn built_in_scenarios_are_written_and_read_back() {
     let directory = tempfile::tempdir().unwrap();
     let rooms = directory.path().join("new/rooms");
     ends_with(0, &["scenarios", "--write", rooms.to_str().unwrap()]);
-    assert_eq!(fs::read_dir(&rooms).unwrap().count(), scene::BUILTIN.len());
+    let shipped = scene::BUILTIN.len() + scene::warehouses().len();
+    assert_eq!(fs::read_dir(&rooms).unwrap().count(), shipped);
     let file = rooms.join("e1.toml");
     assert_eq!(
         fs::read_to_string(&file).unwrap(),
