@@ -180,11 +180,12 @@ impl Store {
 
     /// Sets of placements that cut a leg: every single one, and joint ones until there is a way.
     fn add_cuts(&mut self, scene: &Scene, ways: &mut Ways, leg: Leg, at_goal: bool) {
+        let overlaps = self.overlaps_of(leg);
         let mut standing: Vec<_> = (0..scene.objects.len())
             .filter(|&object| object != leg.task())
             .filter(|&object| !at_goal || scene.objects[object].goal.is_some())
             .map(|object| Placement { object, at_goal })
-            .filter(|&placement| !self.has_overlap(leg, placement))
+            .filter(|placement| !overlaps.contains(placement))
             .collect();
         while let Some(cut) = ways.smallest_cut(scene, leg, &standing) {
             if cut.is_empty() {
@@ -198,18 +199,20 @@ impl Store {
         }
     }
 
-    /// Whether an overlap says at least as much as that this placement cuts the leg by itself.
-    fn has_overlap(&self, leg: Leg, placement: Placement) -> bool {
-        let stronger: &[Reason] = match (leg, placement.at_goal) {
-            (Leg::Transfer(_), false) => &[Reason::E1, Reason::E3],
-            (Leg::Transfer(_), true) => &[Reason::E2, Reason::E4],
-            (Leg::Approach(_), _) => &[Reason::E1],
-            (Leg::Return(_), _) => &[Reason::E4],
+    /// Placements of which an overlap says at least as much as that they cut a leg by themselves.
+    fn overlaps_of(&self, leg: Leg) -> Vec<Placement> {
+        let says = |known: &&Constraint| match (leg, known.blockers.as_slice()) {
+            (Leg::Transfer(_), [placement]) if placement.at_goal => {
+                matches!(known.reason, Reason::E2 | Reason::E4)
+            }
+            (Leg::Transfer(_), [_]) => matches!(known.reason, Reason::E1 | Reason::E3),
+            (Leg::Approach(_), [_]) => known.reason == Reason::E1,
+            (Leg::Return(_), [_]) => known.reason == Reason::E4,
+            (_, _) => false,
         };
-        self.constraints.iter().any(|known| {
-            known.task == leg.task()
-                && known.blockers == [placement]
-                && stronger.contains(&known.reason)
-        })
+        let own = (self.constraints.iter()).filter(|known| known.task == leg.task());
+        own.filter(says)
+            .flat_map(|known| known.blockers.iter().copied())
+            .collect()
     }
 }
