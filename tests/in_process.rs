@@ -355,6 +355,14 @@ fn planning_ahead_solves_every_shipped_room_that_can_be_solved() {
     }
 }
 
+#[test]
+fn a_warehouse_of_a_hundred_pods_is_solved() {
+    let [warehouse, _] = scene::warehouses();
+    let scene = parse(warehouse.name, warehouse.text);
+    let report = run(&scene, &with(Method::Anytime));
+    assert_eq!(report.outcome, Outcome::Solved, "{:?}", report.reason);
+}
+
 /// Half of them need intermediate places.
 #[test]
 fn planning_ahead_solves_random_rooms() {

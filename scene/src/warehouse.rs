@@ -90,7 +90,10 @@ impl Floor {
 
     /// The cells of all racks.
     fn slots(self) -> Vec<Cell> {
-        let is_rack = |x: usize, y: usize| x % (RACK.0 + 1) != 0 && (y - 1) % (RACK.1 + 1) != 0;
+        let is_rack = |x: usize, y: usize| {
+            let is_aisle = x.is_multiple_of(RACK.0 + 1) || (y - 1).is_multiple_of(RACK.1 + 1);
+            !is_aisle
+        };
         (1..self.height() - 1)
             .flat_map(|y| (0..self.width()).map(move |x| (x, y)))
             .filter(|&(x, y)| is_rack(x, y))
