@@ -175,8 +175,13 @@ impl Planner {
         let in_force = header.schedule_version;
         let is_due = match &mut self.anytime {
             None => self.standing == Standing::Written && in_force == 0,
-            // One that was started again leaves robots with what they follow.
-            Some(_) if self.schedule_version == 0 && in_force > 0 => false,
+            // One that was started again knows nothing of what robots follow.
+            Some(anytime) if self.schedule_version == 0 && in_force > 0 => {
+                anytime.replan(snapshot);
+                let counters = &mut self.counters;
+                self.standing = anytime.advance(scene, snapshot, budget, counters, schedule);
+                self.standing == Standing::Written
+            }
             Some(anytime) if self.schedule_version == in_force => {
                 if anytime.list_more(snapshot.robots(), schedule) {
                     true
@@ -188,7 +193,10 @@ impl Planner {
             }
             Some(anytime) => {
                 let is_late = header.tick > schedule.effect_tick + TICKS_TO_ADOPT;
-                is_late && anytime.take_back(snapshot.robots(), schedule)
+                if is_late {
+                    anytime.take_back(snapshot, schedule);
+                }
+                is_late
             }
         };
         if !is_due {

@@ -53,7 +53,8 @@ pub struct RobotSchedule {
     /// granted in part must be listed as it was. List the last one granted as long as its grip
     /// is not done: a process of the robot that is started then knows of it.
     pub first: u32,
-    /// How many actions are listed.
+    /// How many actions are listed. Where it is none, the robot stops where its grant ends when
+    /// the schedule comes into force, be it in the middle of an action.
     pub count: u32,
     /// Where in [`Schedule::actions`] they begin.
     pub offset: u32,

@@ -164,6 +164,21 @@ impl<'s> Simulation<'s> {
         self.tell(ControlKind::Up, RoleKind::Robot, id, incarnation);
     }
 
+    /// Robot `id` takes part no more: it stays where it is, with what it holds.
+    ///
+    /// # Panics
+    /// When there is no such robot.
+    pub fn lose_robot(&mut self, id: usize) {
+        let incarnation = self.commands[id].incarnation;
+        self.tell(ControlKind::Down, RoleKind::Robot, id, incarnation);
+    }
+
+    /// Puts another planner in the place of the one there is. It knows only what the snapshots
+    /// say.
+    pub fn restart_planner(&mut self) {
+        self.planner = Planner::new(self.scene, self.settings.clone());
+    }
+
     fn tell(&mut self, kind: ControlKind, role: RoleKind, index: usize, incarnation: u32) {
         self.control_id += 1;
         self.control.push(ControlRequest {

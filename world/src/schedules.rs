@@ -50,7 +50,13 @@ impl World {
         });
         if fits {
             self.schedules.in_force = version;
-            self.robots.iter_mut().for_each(Robot::keep_whole_actions);
+            for (i, robot) in self.robots.iter_mut().enumerate() {
+                if schedule.is_some_and(|schedule| schedule.robots[i].count == 0) {
+                    robot.keep_path();
+                } else {
+                    robot.keep_whole_actions();
+                }
+            }
         } else {
             self.counters.schedules_refused += 1;
         }
@@ -59,10 +65,14 @@ impl World {
 }
 
 /// Whether a schedule goes on where robot `i`'s grant ends: no gap after what is granted, and
-/// what it lists of that leads where it was granted to.
+/// what it lists of that leads where it was granted to. One that lists nothing stops the robot
+/// where its grant ends, be it between the ends of actions.
 fn goes_on(schedule: &Schedule, i: usize, robot: &Robot) -> bool {
     let granted = robot.granted_actions();
     let part = &schedule.robots[i];
+    if part.count == 0 {
+        return part.first <= granted;
+    }
     let leads_to = |number: u32, place| {
         let action = schedule.action(i, number);
         action.is_some_and(|action| is_at(vec(action.to), place))
@@ -272,6 +282,23 @@ mod tests {
         );
         bench.steps(600);
         assert_eq!(bench.at(0), [3.0, 1.0], "and no further");
+    }
+
+    #[test]
+    fn where_nothing_is_listed_a_robot_stops_where_its_grant_ends() {
+        let mut bench = partly_granted();
+        let granted = bench.robot(0).grant()[1];
+        bench.schedule = Some(schedule(2, 0, &[]));
+        bench.step();
+        assert_eq!((bench.header().schedule_version, refused(&bench)), (2, 0));
+        bench.steps(1_400);
+        assert_eq!(bench.at(0), [granted.x, granted.y]);
+        assert!(granted.x > 3.0, "between two ends");
+        // From there it goes on, and what comes after is numbered as ever.
+        bench.schedule = Some(schedule(3, 0, &[[granted.x, granted.y], [3.0, 2.0]]));
+        bench.step();
+        assert_eq!((bench.header().schedule_version, refused(&bench)), (3, 0));
+        assert_eq!(bench.robot(0).actions, 1);
     }
 
     #[test]

@@ -259,6 +259,15 @@ impl Robot {
         self.drop_rest();
     }
 
+    /// Keeps the path granted to its end, wherever that is, and drops all else.
+    pub(crate) fn keep_path(&mut self) {
+        if self.cut {
+            let end = self.grant.points().last().copied();
+            self.action_end = Some(end.unwrap_or(self.position));
+        }
+        self.drop_rest();
+    }
+
     /// Drops what was asked for and not granted.
     pub(crate) fn drop_rest(&mut self) {
         self.actions = self.granted_actions();

@@ -58,6 +58,8 @@ pub(crate) struct Ground {
     pub(crate) height: i32,
     pub(crate) classes: usize,
     walls: Vec<Occupancy>,
+    /// What stands there for ever and is no wall of the scene.
+    pub(crate) obstacles: Vec<(Shape, Vec2)>,
     /// By class that is kept away, then class that is there.
     masks: Vec<Mask>,
     fields: HashMap<(usize, u32), Field>,
@@ -75,12 +77,16 @@ pub(crate) struct Ground {
 }
 
 impl Ground {
-    pub(crate) fn new(scene: &Scene, settings: &Settings) -> Self {
+    /// With what stands where robots are gone, beside the walls.
+    pub(crate) fn new(scene: &Scene, settings: &Settings, obstacles: Vec<(Shape, Vec2)>) -> Self {
         let classes = scene.class_count();
         let walls: Vec<Occupancy> = (0..classes)
             .map(|class| {
                 let mut walls = Occupancy::new(scene);
                 walls.reset(scene, ClassId(class));
+                for (shape, at) in &obstacles {
+                    walls.block(scene, shape, *at, true);
+                }
                 walls
             })
             .collect();
@@ -115,6 +121,7 @@ impl Ground {
             grasps: scene.objects.iter().map(|object| object.grasp).collect(),
             carrying: scene.objects.iter().map(|object| object.class.0).collect(),
             walls,
+            obstacles,
             masks,
             fields: HashMap::new(),
             flood: DistanceField::new(scene),
@@ -233,7 +240,11 @@ impl Ground {
         if let Some(field) = self.fields.get(&(class, to)) {
             return Arc::clone(field);
         }
-        self.flood.occupancy().reset(scene, ClassId(class));
+        let occupancy = self.flood.occupancy();
+        occupancy.reset(scene, ClassId(class));
+        for (shape, at) in &self.obstacles {
+            occupancy.block(scene, shape, *at, true);
+        }
         self.flood.begin(scene, scene.lattice.at(to));
         let mut budget = Budget::new(u64::MAX);
         let done = self.flood.advance(&mut budget, &mut self.counters);

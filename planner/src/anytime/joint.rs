@@ -131,10 +131,10 @@ impl Joint {
             open: BinaryHeap::new(),
         };
         let mut first = vec![NONE; 3 * homes.len() + objects.len()];
-        for (robot, &cell) in homes.iter().enumerate() {
-            first[3 * robot] = cell as u16;
+        for (robot, track) in start.robots.iter().enumerate() {
+            first[3 * robot] = track.free.0 as u16;
         }
-        for (object, place) in start.objects.iter().enumerate() {
+        for (object, (place, _)) in start.objects.iter().enumerate() {
             if place.is_open() {
                 first[3 * homes.len() + object] = place.grasp as u16;
                 continue;
@@ -151,7 +151,7 @@ impl Joint {
             }
         }
         let shut = |goal: &Option<Rc<Place>>| goal.as_ref().is_some_and(|goal| !goal.is_open());
-        let open = |place: &Rc<Place>| place.is_open();
+        let open = |(place, _): &(Rc<Place>, u32)| place.is_open();
         joint.is_hopeless |=
             (goals.iter().zip(&start.objects)).any(|(goal, place)| shut(goal) && open(place));
         joint.offer(first.into(), (u32::MAX, 0, JointMove::Step(0)));

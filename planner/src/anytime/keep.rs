@@ -51,7 +51,7 @@ pub(crate) fn kept(
             continue;
         }
         kept[robot] = end;
-        let actions = before_action(granted, before)..granted[end - 1] as usize;
+        let actions = script.actions_with(robot, before)..granted[end - 1] as usize;
         for wait in actions.flat_map(|action| script.waits(robot, action)) {
             open.push((wait.robot as usize, deeds_for(script, *wait)));
         }
@@ -83,11 +83,6 @@ fn end_of_action(track: &Track, granted: &[u32], least: usize) -> usize {
         }
     }
     track.deeds.len()
-}
-
-/// How many actions are kept with the first `kept` deeds.
-fn before_action(granted: &[u32], kept: usize) -> usize {
-    kept.checked_sub(1).map_or(0, |last| granted[last] as usize)
 }
 
 /// How many deeds a robot has to keep for what waits for it.
@@ -123,6 +118,7 @@ mod tests {
     use shm_types::RobotState;
 
     use super::*;
+    use crate::anytime::situation::Situation;
     use crate::anytime::solver::Solver;
 
     #[test]
@@ -135,16 +131,22 @@ mod tests {
                 ..scene::GenerateOptions::default()
             };
             let scene = scene::generate(&options).unwrap().scene;
-            let mut solver = Solver::new(&scene, &Settings::default()).unwrap();
+            let mut solver =
+                Solver::new(&scene, &Settings::default(), &Situation::at_start(&scene)).unwrap();
             let makespan = (0..5).find_map(|attempt| solver.first(&scene, attempt));
             let makespan = makespan.unwrap();
             solver.restore().unwrap();
-            let script = Script::of(&scene, &solver.ground, &solver.plan, None);
+            let script = Script::of(
+                &scene,
+                &solver.ground,
+                &solver.plan,
+                &Situation::at_start(&scene),
+            );
             let tracks = solver.plan.tracks();
             for share in 0..10 {
                 let robots = vec![RobotState::default(); tracks.len()];
                 let kept = kept(&script, tracks, &robots, makespan / 10 * share);
-                let actions = |robot: usize| before_action(script.granted(robot), kept[robot]);
+                let actions = |robot: usize| script.actions_with(robot, kept[robot]);
                 for (robot, track) in tracks.iter().enumerate() {
                     let grips = track.deeds[..kept[robot]]
                         .iter()

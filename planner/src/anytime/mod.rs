@@ -19,6 +19,7 @@ mod plan;
 mod publish;
 mod route;
 mod sequence;
+mod situation;
 mod solver;
 mod timeline;
 mod track;
@@ -28,6 +29,7 @@ use shm_types::{Checked, Counters, RobotSchedule, RobotState, Schedule, Verdict,
 
 use crate::anytime::keep::kept;
 use crate::anytime::publish::Script;
+use crate::anytime::situation::{Situation, stands_still};
 use crate::anytime::solver::Solver;
 use crate::proof::Proof;
 
@@ -43,6 +45,8 @@ const REACTION_S: f64 = 0.25;
 const MOST_S: u64 = 60;
 /// Sequences looked for before the complete search begins.
 const ATTEMPTS_BEFORE_SEARCH: u64 = 3;
+/// Ticks for which nothing may change before it counts as standing still.
+const TICKS_TO_SETTLE: u64 = 20;
 /// One configuration of the complete search, in work units.
 const UNITS_PER_CONFIGURATION: u64 = 40;
 /// One safe interval expanded, in work units.
@@ -51,7 +55,11 @@ const UNITS_PER_INTERVAL: u64 = 12;
 /// What comes next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
-    /// Taking in the scene.
+    /// Robots are to go no further than is granted to them, since something has changed.
+    Stop,
+    /// They stand still, if nothing changes until this tick, as of this number of changes.
+    Settle(u64, u64),
+    /// Taking in the scene, and where everything stands.
     New,
     /// A first plan: so many attempts were made.
     First(u64),
@@ -88,6 +96,12 @@ pub(crate) enum Standing {
 pub(crate) struct Anytime {
     settings: Settings,
     solver: Option<Box<Solver>>,
+    /// Where everything stood when planning began.
+    situation: Situation,
+    /// By robot, 1 if it takes part.
+    team: Vec<u32>,
+    /// Whether the plan is one for all objects.
+    verdict: Verdict,
     stage: Stage,
     /// Units done and not paid for.
     debt: u64,
@@ -111,6 +125,9 @@ impl Anytime {
         Self {
             settings: settings.clone(),
             solver: None,
+            situation: Situation::default(),
+            team: Vec::new(),
+            verdict: Verdict::Open,
             stage: Stage::New,
             debt: 0,
             spent: 0,
@@ -133,23 +150,27 @@ impl Anytime {
         counters: &mut Counters,
         out: &mut Schedule,
     ) -> Standing {
+        if self.is_other_team(snapshot.robots()) {
+            self.replan(snapshot);
+        }
         loop {
             let paid = self.debt.min(budget.left());
             budget.spend(paid);
             self.debt -= paid;
             if let Stage::Done(verdict) = self.stage {
-                return Standing::Idle(verdict);
+                let is_open = verdict == Verdict::Open;
+                return Standing::Idle(if is_open { self.verdict } else { verdict });
+            }
+            if !self.has_settled(snapshot) {
+                return Standing::Busy;
             }
             if self.debt > 0 || budget.is_spent() {
                 return match self.script {
                     None => Standing::Busy,
-                    Some(_) => Standing::Idle(Verdict::Open),
+                    Some(_) => Standing::Idle(self.verdict),
                 };
             }
-            let before = self.spent;
-            let is_written = self.work(scene, snapshot, counters, out);
-            self.debt += self.spent - before;
-            if is_written {
+            if self.work(scene, snapshot, counters, out) {
                 return Standing::Written;
             }
         }
@@ -172,14 +193,69 @@ impl Anytime {
         is_due
     }
 
-    /// Goes back to the plan before, if the newest was refused. Whether that is to be published.
-    pub(crate) fn take_back(&mut self, robots: &[RobotState], out: &mut Schedule) -> bool {
-        let Some(script) = self.replaced.take() else {
-            return false;
+    /// What was published was refused: goes back to the plan before, or else plans anew.
+    pub(crate) fn take_back(&mut self, snapshot: Checked<WorldSnapshot>, out: &mut Schedule) {
+        if let Some(script) = self.replaced.take() {
+            let robots = snapshot.robots();
+            script.write(|robot| robots[robot].actions, out);
+            self.script = Some(script);
+            self.stage = Stage::Done(Verdict::Open);
+        } else {
+            self.stop(snapshot, out);
+        }
+    }
+
+    /// Plans anew from where everything is, since what the plan assumes is no longer so.
+    pub(crate) fn replan(&mut self, snapshot: Checked<WorldSnapshot>) {
+        self.stage = match snapshot.header.schedule_version {
+            0 => Stage::New,
+            _ => Stage::Stop,
         };
-        script.write(|robot| robots[robot].actions, out);
-        self.script = Some(script);
-        self.stage = Stage::Done(Verdict::Open);
+    }
+
+    /// Whether other robots take part than did when this was asked last.
+    fn is_other_team(&mut self, robots: &[RobotState]) -> bool {
+        let is_same = (self.team.iter()).eq(robots.iter().map(|robot| &robot.live));
+        let is_first = self.team.is_empty();
+        if !is_same {
+            self.team.clear();
+            self.team.extend(robots.iter().map(|robot| robot.live));
+        }
+        !is_same && !is_first
+    }
+
+    /// Lists nothing: robots go no further than is granted to them.
+    fn stop(&mut self, snapshot: Checked<WorldSnapshot>, out: &mut Schedule) {
+        let robots = snapshot.robots();
+        out.robot_count = robots.len() as u32;
+        (out.action_count, out.wait_count) = (0, 0);
+        for (listed, state) in out.robots.iter_mut().zip(robots) {
+            *listed = RobotSchedule {
+                first: state.actions,
+                ..RobotSchedule::default()
+            };
+        }
+        self.script = None;
+        self.replaced = None;
+        self.solver = None;
+        self.begun_ns = None;
+        self.stage = Stage::Settle(u64::MAX, 0);
+    }
+
+    /// Whether everybody stands still, and has for a while.
+    fn has_settled(&mut self, snapshot: Checked<WorldSnapshot>) -> bool {
+        let header = &snapshot.header;
+        let Stage::Settle(until, change) = self.stage else {
+            return true;
+        };
+        if until == u64::MAX || change != header.change || !stands_still(&snapshot) {
+            self.stage = Stage::Settle(header.tick + TICKS_TO_SETTLE, header.change);
+            return false;
+        }
+        if header.tick < until {
+            return false;
+        }
+        self.stage = Stage::New;
         true
     }
 
@@ -191,10 +267,22 @@ impl Anytime {
         counters: &mut Counters,
         out: &mut Schedule,
     ) -> bool {
-        if self.stage == Stage::New {
-            self.solver = Solver::new(scene, &self.settings).map(Box::new);
-            self.stage = Stage::First(0);
-            return false;
+        match self.stage {
+            Stage::Stop => {
+                self.stop(snapshot, out);
+                return true;
+            }
+            Stage::New => {
+                self.situation = Situation::of(&snapshot);
+                let situation = &self.situation;
+                self.solver = Solver::new(scene, &self.settings, situation).map(Box::new);
+                (self.spent, self.cells, self.ways) = (0, 0, 0);
+                self.verdict = Verdict::Open;
+                self.proving = Counters::default();
+                self.stage = Stage::First(0);
+                return false;
+            }
+            _ => {}
         }
         let Some(mut solver) = self.solver.take() else {
             self.stage = Stage::Done(Verdict::NotFound);
@@ -206,7 +294,9 @@ impl Anytime {
         counters.cells_expanded += cells - self.cells;
         counters.path_plans += ways - self.ways;
         (self.cells, self.ways) = (cells, ways);
-        self.spent = solver.units() + self.proving.cells_expanded;
+        let spent = solver.units() + self.proving.cells_expanded;
+        self.debt += spent - self.spent;
+        self.spent = spent;
         self.solver = Some(solver);
         is_written
     }
@@ -230,9 +320,16 @@ impl Anytime {
             Stage::First(attempt) => match solver.first(scene, attempt) {
                 Some(makespan) => better(solver, makespan),
                 None if attempt + 1 < ATTEMPTS_BEFORE_SEARCH => Stage::First(attempt + 1),
-                None if attempt + 1 == ATTEMPTS_BEFORE_SEARCH => Stage::Prove,
+                None if solver.is_short => self.most(solver, scene),
+                None if attempt + 1 == ATTEMPTS_BEFORE_SEARCH => {
+                    if solver.is_start {
+                        Stage::Prove
+                    } else {
+                        Stage::Search
+                    }
+                }
                 None if solver.units() < most => Stage::First(attempt + 1),
-                None => Stage::Done(Verdict::NotFound),
+                None => self.most(solver, scene),
             },
             Stage::Prove => {
                 let (proof, work) = Proof::search(scene);
@@ -253,8 +350,9 @@ impl Anytime {
             Stage::Write => match solver.restore() {
                 None => Stage::Done(Verdict::NotFound),
                 Some(makespan) => {
-                    let script = Script::of(scene, &solver.ground, &solver.plan, None);
-                    script.write(|_| 0, out);
+                    let script = Script::of(scene, &solver.ground, &solver.plan, &self.situation);
+                    let robots = snapshot.robots();
+                    script.write(|robot| robots[robot].actions, out);
                     self.script = Some(script);
                     is_written = true;
                     let worth_s = solver.ground.seconds(makespan) * PATIENCE_UNDER_WAY;
@@ -280,9 +378,18 @@ impl Anytime {
                     Stage::Done(Verdict::Open)
                 }
             }
-            Stage::New | Stage::Done(_) => self.stage,
+            Stage::Stop | Stage::Settle(..) | Stage::New | Stage::Done(_) => self.stage,
         };
         is_written
+    }
+
+    /// There is no plan for all objects: as many as possible are brought to their goals.
+    fn most(&mut self, solver: &mut Solver, scene: &Scene) -> Stage {
+        self.verdict = Verdict::NotFound;
+        match solver.most(scene) {
+            Some(_) => Stage::Write,
+            None => Stage::Done(Verdict::NotFound),
+        }
     }
 
     /// Begins to look for a better plan that goes on from where robots will be by then. False if
@@ -319,7 +426,7 @@ impl Anytime {
         if !solver.has_better() || solver.restore().is_none() {
             return false;
         }
-        let better = Script::of(scene, &solver.ground, &solver.plan, Some(script));
+        let better = script.go_on(scene, &solver.ground, &solver.plan);
         let robots = snapshot.robots();
         if !script.agrees(&better, robots) {
             solver.drop_better();

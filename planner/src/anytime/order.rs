@@ -84,7 +84,12 @@ impl Hops {
         for hop in &list {
             let field = ground.field(scene, alone, hop.from.grasp);
             for (row, track) in approach.iter_mut().zip(&start.robots) {
-                row.push(read(&field, track.free.0));
+                let way = if track.is_gone {
+                    EVER
+                } else {
+                    read(&field, track.free.0)
+                };
+                row.push(way);
             }
             for (other, row) in list.iter().zip(&mut between) {
                 row.push(read(&field, other.to.grasp));
@@ -97,7 +102,7 @@ impl Hops {
         for (&home, track) in homes.iter().zip(&start.robots) {
             let field = ground.field(scene, alone, home);
             let (cell, time, _) = track.free;
-            free.push((time, read(&field, cell)));
+            free.push((time, if track.is_gone { 0 } else { read(&field, cell) }));
             for (hop, row) in list.iter().zip(&mut back) {
                 row.push(read(&field, hop.to.grasp));
             }
@@ -209,7 +214,8 @@ impl Clocks {
         let hop = self.next[object];
         let early = hops.before[hop].iter().any(|&before| !self.done[before]);
         let done = self.released_by(hops, hop, robot);
-        (!early).then(|| done.saturating_add(hops.back[hop][robot]))
+        let home_by = done.saturating_add(hops.back[hop][robot]);
+        (!early && home_by < EVER).then_some(home_by)
     }
 
     fn released_by(&self, hops: &Hops, hop: usize, robot: usize) -> Time {
@@ -248,6 +254,9 @@ fn precedence(
     }
     for class in 0..ground.classes {
         let mut pieces = Pieces::new(scene, ClassId(class));
+        for (shape, at) in &ground.obstacles {
+            pieces.block(scene, shape, *at, true);
+        }
         let alone = class == ROBOT_ALONE.0;
         let hinders = |pieces: &Pieces, hop: &Hop| {
             if alone {

@@ -53,9 +53,11 @@ impl Plan {
         self.timeline.clear();
         self.tracks.clone_from(&start.robots);
         for (robot, track) in self.tracks.iter().enumerate() {
-            enter(&mut self.timeline, ground, robot as Owner, track);
+            if !track.is_gone {
+                enter(&mut self.timeline, ground, robot as Owner, track);
+            }
         }
-        for (object, place) in start.objects.iter().enumerate() {
+        for (object, (place, _)) in start.objects.iter().enumerate() {
             let owner = self.robots + object as u32;
             for (class, cells) in place.cells.iter().enumerate() {
                 self.timeline.occupy(class, cells, owner, 0);
@@ -236,7 +238,8 @@ impl Plan {
     ) {
         let mut start = start.clone();
         let mut rests = start.rests();
-        let mut now = 0;
+        let ends = start.robots.iter().map(|track| track.end.1);
+        let mut now = ends.max().unwrap_or(0);
         for &(robot, made) in moves {
             let track = &mut start.robots[robot];
             let cell = &mut track.end.0;
@@ -308,7 +311,8 @@ impl Plan {
             let in_the_way = (0..self.tracks.len()).find(|&other| {
                 let end = self.tracks[other].end.0;
                 let meets = |&(cell, class): &(u32, usize)| ground.meet(class, cell, 0, end);
-                other != wanted.robot && (clear == Err(other) || bodies.iter().any(meets))
+                let takes_part = other != wanted.robot && !self.tracks[other].is_gone;
+                takes_part && (clear == Err(other) || bodies.iter().any(meets))
             })?;
             self.make_room(ground, router, in_the_way, &bodies, &wanted.to)?;
         }
@@ -407,7 +411,7 @@ impl Plan {
             progress = false;
             let mut away = false;
             for robot in 0..self.tracks.len() {
-                if self.ends_at_home(robot) {
+                if self.ends_at_home(robot) || self.tracks[robot].is_gone {
                     continue;
                 }
                 let home = self.homes[robot];
@@ -444,7 +448,7 @@ impl Plan {
     fn clear_from(&self, ground: &Ground, mover: usize, place: &Place) -> Result<Time, usize> {
         let mut clear = 0;
         for (robot, track) in self.tracks.iter().enumerate() {
-            if robot == mover {
+            if robot == mover || track.is_gone {
                 continue;
             }
             let mut class = ROBOT_ALONE.0;

@@ -18,6 +18,7 @@ use crate::anytime::ground::Ground;
 use crate::anytime::keep::ACTIONS_AHEAD;
 use crate::anytime::plan::Plan;
 use crate::anytime::route::sides;
+use crate::anytime::situation::{RobotAt, Situation};
 use crate::anytime::track::{Deed, Track};
 
 /// Most steps in one action.
@@ -43,16 +44,48 @@ struct Joined {
     first: Vec<u32>,
 }
 
-/// All that robots will do: by robot its actions, each with what it waits for.
+/// What one robot will do.
+#[derive(Default)]
+struct Part {
+    /// Number of the first action in `actions`.
+    first: u32,
+    /// How many there were before anything was planned.
+    begun: u32,
+    /// Each with what it waits for.
+    actions: Vec<(Action, Vec<Wait>)>,
+}
+
+/// All that robots will do.
 pub(crate) struct Script {
-    robots: Vec<Vec<(Action, Vec<Wait>)>>,
+    robots: Vec<Part>,
     /// By robot and deed: how many actions are granted once it is.
     granted: Vec<Vec<u32>>,
 }
 
 impl Script {
-    /// The whole of a plan. What robots keep is as `before` has it.
-    pub(crate) fn of(scene: &Scene, ground: &Ground, plan: &Plan, before: Option<&Self>) -> Self {
+    /// The whole of a plan that robots begin with, or go on with as the situation is.
+    pub(crate) fn of(scene: &Scene, ground: &Ground, plan: &Plan, situation: &Situation) -> Self {
+        let part = |robot: &RobotAt| Part::standing(robot);
+        let before = Self {
+            robots: situation.robots.iter().map(part).collect(),
+            granted: vec![Vec::new(); situation.robots.len()],
+        };
+        Self::joined(scene, ground, plan, &before, |_| 0)
+    }
+
+    /// The whole of a plan that keeps a part of this one.
+    pub(crate) fn go_on(&self, scene: &Scene, ground: &Ground, plan: &Plan) -> Self {
+        Self::joined(scene, ground, plan, self, |robot| plan.tracks()[robot].kept)
+    }
+
+    /// A plan's actions after those of `before` with which so many deeds are done.
+    fn joined(
+        scene: &Scene,
+        ground: &Ground,
+        plan: &Plan,
+        before: &Self,
+        kept: impl Fn(usize) -> usize,
+    ) -> Self {
         let mut needs: Vec<Vec<Need>> = (plan.tracks().iter().enumerate())
             .map(|(robot, track)| needs_of(ground, plan, robot as u32, track))
             .collect();
@@ -67,7 +100,9 @@ impl Script {
         }
         let joined: Vec<Joined> = (waited.iter().enumerate())
             .map(|(robot, waited)| {
-                let kept = before.map(|before| &before.granted[robot][..]);
+                let granted = &before.granted[robot][..kept(robot)];
+                let begun = before.robots[robot].begun;
+                let kept = (granted.last().copied().unwrap_or(begun), granted);
                 join(scene, ground, plan, robot, &needs[robot], waited, kept)
             })
             .collect();
@@ -85,10 +120,13 @@ impl Script {
                 }
                 (*action, waits)
             });
-            let kept = before.map_or(&[][..], |before| {
-                &before.robots[robot][..part.kept as usize]
-            });
-            kept.iter().cloned().chain(actions).collect()
+            let known = &before.robots[robot];
+            let kept = &known.actions[..(part.kept - known.first) as usize];
+            Part {
+                first: known.first,
+                begun: known.begun,
+                actions: kept.iter().cloned().chain(actions).collect(),
+            }
         };
         Self {
             robots: joined.iter().zip(&needs).enumerate().map(script).collect(),
@@ -101,9 +139,16 @@ impl Script {
         &self.granted[robot]
     }
 
+    /// How many actions of a robot are granted once its first `deeds` deeds are.
+    pub(crate) fn actions_with(&self, robot: usize, deeds: usize) -> usize {
+        let last = deeds.checked_sub(1).map(|last| self.granted[robot][last]);
+        last.unwrap_or(self.robots[robot].begun) as usize
+    }
+
     /// What an action waits for.
     pub(crate) fn waits(&self, robot: usize, action: usize) -> &[Wait] {
-        &self.robots[robot][action].1
+        let part = &self.robots[robot];
+        &part.actions[action - part.first as usize].1
     }
 
     /// Whether robots may go on with `other` where they are: all that may be granted to them
@@ -111,10 +156,10 @@ impl Script {
     pub(crate) fn agrees(&self, other: &Self, robots: &[RobotState]) -> bool {
         let mut scripts = robots.iter().zip(self.robots.iter().zip(&other.robots));
         scripts.all(|(state, (mine, others))| {
-            let granted = state.actions as usize;
-            let ahead = (mine.iter().enumerate()).skip(granted.saturating_sub(1));
+            let granted = state.actions.saturating_sub(mine.first) as usize;
+            let ahead = (mine.actions.iter().enumerate()).skip(granted.saturating_sub(1));
             for (number, (action, _)) in ahead.take(1 + ACTIONS_AHEAD as usize) {
-                let known = others.get(number).map(|(known, _)| known);
+                let known = others.actions.get(number).map(|(known, _)| known);
                 let is_same = |known: &Action| {
                     known.to == action.to
                         && (known.grip, known.object) == (action.grip, action.object)
@@ -142,9 +187,10 @@ impl Script {
     fn fits(&self, granted: impl Fn(usize) -> u32, window: usize, out: &mut Schedule) -> bool {
         let (mut actions, mut waits) = (0, 0);
         out.robot_count = self.robots.len() as u32;
-        for (robot, script) in self.robots.iter().enumerate() {
-            let first = granted(robot).saturating_sub(1);
-            let ahead = &script[(first as usize).min(script.len())..];
+        for (robot, part) in self.robots.iter().enumerate() {
+            let first = granted(robot).saturating_sub(1).max(part.first);
+            let passed = (first - part.first) as usize;
+            let ahead = &part.actions[passed.min(part.actions.len())..];
             let listed = &ahead[..window.min(ahead.len())];
             out.robots[robot] = RobotSchedule {
                 first,
@@ -264,8 +310,8 @@ fn find(plan: &Plan, (object, event): (usize, Event)) -> Option<(usize, usize)> 
     found.map(|(_, robot, number)| (robot, number))
 }
 
-/// Joins the steps of a robot after those that it keeps, of which `kept` says how many actions are
-/// granted once they are.
+/// Joins the steps of a robot after those that it keeps: `kept` says how many actions come before,
+/// and by deed how many are granted once it is.
 fn join(
     scene: &Scene,
     ground: &Ground,
@@ -273,13 +319,12 @@ fn join(
     robot: usize,
     needs: &[Need],
     waited: &[bool],
-    kept: Option<&[u32]>,
+    (before, kept): (u32, &[u32]),
 ) -> Joined {
     let track = &plan.tracks()[robot];
-    let kept = kept.map_or(&[][..], |granted| &granted[..track.kept]);
     let mut stops = (track.grips()).map(|grip| grip.place.at + ground.grasps[grip.object]);
     let mut joined = Joined {
-        kept: kept.last().copied().unwrap_or(0),
+        kept: before,
         actions: Vec::new(),
         granted: kept.to_vec(),
         first: Vec::new(),
@@ -287,7 +332,7 @@ fn join(
     let mut needs = needs.iter().peekable();
     let mut cell = track.start;
     // Where the robot stands beside the lattice, its next way leads to the lattice first.
-    let mut beside = !track.deeds.is_empty() && !is_at(scene, cell, scene.homes[robot]);
+    let mut beside = !track.deeds.is_empty() && !is_at(scene, cell, track.from);
     for deed in &track.deeds[..kept.len()] {
         match deed.direction() {
             Some(direction) => {
@@ -358,18 +403,39 @@ fn is_at(scene: &Scene, cell: u32, at: Vec2) -> bool {
     (scene.lattice.at(cell) - at).norm() <= CONTACT_M
 }
 
+impl Part {
+    /// Nothing to do where a robot stands. What was granted to it last is listed as done: no grip
+    /// is due any more.
+    fn standing(robot: &RobotAt) -> Self {
+        let last = robot
+            .is_live
+            .then(|| robot.actions.checked_sub(1))
+            .flatten();
+        Self {
+            first: last.unwrap_or(robot.actions),
+            begun: robot.actions,
+            actions: (last.iter().map(|_| (moving(point(robot.at)), Vec::new()))).collect(),
+        }
+    }
+}
+
+/// An action that does not grip.
+fn moving(to: shm_types::Point) -> Action {
+    Action {
+        to,
+        grip: Grip::Keep.code(),
+        object: NONE,
+        turn: 0,
+        first_wait: 0,
+        waits: 0,
+        reserved: 0,
+    }
+}
+
 impl Joined {
     fn begin(&mut self, deed: usize, to: shm_types::Point) {
         self.first.push(deed as u32);
-        self.actions.push(Action {
-            to,
-            grip: Grip::Keep.code(),
-            object: NONE,
-            turn: 0,
-            first_wait: 0,
-            waits: 0,
-            reserved: 0,
-        });
+        self.actions.push(moving(to));
     }
 
     /// The last piece of way to a stop beside the lattice, if it is one.
@@ -419,8 +485,13 @@ mod tests {
             };
             (action, vec![wait; waits])
         });
+        let part = Part {
+            first: 0,
+            begun: 0,
+            actions: listed.collect(),
+        };
         Script {
-            robots: vec![listed.collect()],
+            robots: vec![part],
             granted: Vec::new(),
         }
     }

@@ -57,6 +57,8 @@ pub(crate) struct Sequencer {
     /// Whether objects are tried in the order of dice.
     is_shuffled: bool,
     most_floods: u64,
+    /// How many objects are not at their goals after these steps; the fewest so far.
+    most: Option<(usize, Vec<Step>)>,
     pub(crate) floods: u64,
     /// Lattice points looked at.
     pub(crate) cells: u64,
@@ -92,6 +94,7 @@ impl Sequencer {
             random: ChaCha8Rng::seed_from_u64(7),
             is_shuffled: false,
             most_floods: 0,
+            most: None,
             floods: 0,
             cells: 0,
         }
@@ -121,6 +124,14 @@ impl Sequencer {
         None
     }
 
+    /// The sequence with which most objects got to their goals, of all that were looked at.
+    pub(crate) fn most(&self) -> Vec<Step> {
+        self.most
+            .as_ref()
+            .map(|(_, steps)| steps.clone())
+            .unwrap_or_default()
+    }
+
     fn search(
         &mut self,
         scene: &Scene,
@@ -134,6 +145,13 @@ impl Sequencer {
             .collect();
         if self.is_shuffled {
             open.shuffle(&mut self.random);
+        }
+        let missing = open
+            .iter()
+            .filter(|&&object| self.goals[object].is_some())
+            .count();
+        if (self.most.as_ref()).is_none_or(|(fewest, _)| missing < *fewest) {
+            self.most = Some((missing, steps.clone()));
         }
         if open.is_empty() {
             return true;

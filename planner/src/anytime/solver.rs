@@ -18,6 +18,7 @@ use crate::anytime::order::{Clocks, Hops, Item, change};
 use crate::anytime::plan::Plan;
 use crate::anytime::route::Router;
 use crate::anytime::sequence::{Sequencer, Step};
+use crate::anytime::situation::Situation;
 use crate::anytime::track::{Move, Place, Start, Track};
 use crate::anytime::{UNITS_PER_CONFIGURATION, UNITS_PER_INTERVAL};
 
@@ -99,31 +100,52 @@ pub(crate) struct Solver {
     tried: HashSet<Vec<Item>>,
     pub(crate) decoded: u64,
     mode: Mode,
+    /// Whether the plan begins where the scene does.
+    pub(crate) is_start: bool,
+    /// Whether some robot is gone.
+    pub(crate) is_short: bool,
 }
 
 impl Solver {
     /// None if some home cannot be joined to the lattice, or distances would take too much memory.
-    pub(crate) fn new(scene: &Scene, settings: &Settings) -> Option<Self> {
+    pub(crate) fn new(scene: &Scene, settings: &Settings, situation: &Situation) -> Option<Self> {
         let places = 2 * scene.objects.len() + scene.homes.len();
         if places * scene.lattice.len() > MOST_DISTANCES {
             return None;
         }
-        let ground = Ground::new(scene, settings);
-        let homes: Option<Vec<u32>> = (scene.homes.iter())
-            .map(|&home| ground.entry(scene, &[ROBOT_ALONE.0], home, &[]))
+        let ground = Ground::new(scene, settings, situation.obstacles(scene));
+        let start = Start::new(scene, &ground, situation)?;
+        let homes: Option<Vec<u32>> = (scene.homes.iter().zip(&start.robots))
+            .map(|(&home, track)| {
+                if track.is_gone {
+                    return Some(track.start);
+                }
+                ground.entry(scene, &[ROBOT_ALONE.0], home, &[])
+            })
             .collect();
         let homes = homes?;
-        let objects = (scene.objects.iter().enumerate())
-            .map(|(object, spec)| Place::of(scene, &ground, object, spec.start))
+        let goals: Vec<Option<Rc<Place>>> = (scene.objects.iter().zip(&situation.objects))
+            .enumerate()
+            .map(|(object, (spec, state))| {
+                let goal = spec.goal.filter(|_| state.is_movable)?;
+                Some(Place::of(scene, &ground, object, goal))
+            })
             .collect();
-        let start = Start::new(&homes, objects);
-        let goals: Vec<Option<Rc<Place>>> = (scene.objects.iter().enumerate())
-            .map(|(object, spec)| Some(Place::of(scene, &ground, object, spec.goal?)))
+        // Robots come from where they are, and go home.
+        let live = start
+            .robots
+            .iter()
+            .zip(&homes)
+            .filter(|(track, _)| !track.is_gone);
+        let mut bases: Vec<u32> = live
+            .flat_map(|(track, &home)| [track.free.0, home])
             .collect();
+        bases.sort_unstable();
+        bases.dedup();
         Some(Self {
             router: Router::new(&ground),
             plan: Plan::new(&ground, homes.clone()),
-            sequencer: Sequencer::new(scene, &ground, &homes, &goals),
+            sequencer: Sequencer::new(scene, &ground, &bases, &goals),
             ground,
             start,
             homes,
@@ -139,6 +161,8 @@ impl Solver {
             tried: HashSet::new(),
             decoded: 0,
             mode: MODES[0],
+            is_start: situation.is_start,
+            is_short: situation.is_short(),
         })
     }
 
@@ -163,8 +187,15 @@ impl Solver {
     /// A first plan: a sequence, then its moves by whoever can make them soonest. Other attempts
     /// find other sequences.
     pub(crate) fn first(&mut self, scene: &Scene, attempt: u64) -> Option<Time> {
-        let (ground, objects) = (&self.ground, &self.start.objects);
-        let sequence = self.sequencer.find(scene, ground, objects, attempt)?;
+        let rests = self.start.rests().into_iter().map(|rest| rest.place);
+        let objects: Vec<Rc<Place>> = rests.collect();
+        let sequence = (self.sequencer).find(scene, &self.ground, &objects, attempt)?;
+        self.begin_with(scene, &sequence)
+    }
+
+    /// A plan that brings as many objects to their goals as any sequence looked at.
+    pub(crate) fn most(&mut self, scene: &Scene) -> Option<Time> {
+        let sequence = self.sequencer.most();
         self.begin_with(scene, &sequence)
     }
 
@@ -190,6 +221,9 @@ impl Solver {
     /// A first plan by the complete search, a slice of it: nothing while it goes on, then whether
     /// there is a plan, or that there is none.
     pub(crate) fn search(&mut self, scene: &Scene) -> Option<Result<Time, Verdict>> {
+        if self.is_short {
+            return Some(Err(Verdict::NotFound));
+        }
         let mut joint = match self.joint.take() {
             Some(joint) => joint,
             None => {
@@ -208,7 +242,8 @@ impl Solver {
                 None
             }
             Found::TooMany => Some(Err(Verdict::NotFound)),
-            Found::Exhausted => Some(Err(Verdict::Exhausted)),
+            Found::Exhausted if self.is_start => Some(Err(Verdict::Exhausted)),
+            Found::Exhausted => Some(Err(Verdict::NotFound)),
             Found::Plan(moves) => Some(Ok(self.adopt(scene, moves))),
         }
     }
@@ -216,7 +251,8 @@ impl Solver {
     /// Takes moves of single robots over: as a sequence that robots may carry out side by side, or
     /// else as they are.
     fn adopt(&mut self, scene: &Scene, moves: Vec<(usize, JointMove)>) -> Time {
-        let mut cells = self.homes.clone();
+        let start = self.start.robots.iter().map(|track| track.free.0);
+        let mut cells: Vec<u32> = start.collect();
         let mut sequence = Vec::new();
         for &(robot, made) in &moves {
             match made {
@@ -287,10 +323,7 @@ impl Solver {
             clocks.make(hops, object as usize, robot);
             order.push((object, robot as u32));
         }
-        let makespan = self
-            .plan
-            .send_all_home(&mut self.ground, &mut self.router, scene)?;
-        Some((makespan, order))
+        Some((self.send_all_home(scene)?, order))
     }
 
     /// Commits the next move of an object, after those of `order`.
@@ -328,8 +361,15 @@ impl Solver {
                 return None;
             }
         }
-        self.plan
-            .send_all_home(&mut self.ground, &mut self.router, scene)
+        self.send_all_home(scene)
+    }
+
+    /// Sends everybody home, as the last part of a plan. Where a robot is gone, the others may
+    /// have no way home.
+    fn send_all_home(&mut self, scene: &Scene) -> Option<Time> {
+        let (plan, ground, router) = (&mut self.plan, &mut self.ground, &mut self.router);
+        let done = plan.send_all_home(ground, router, scene);
+        done.or_else(|| self.is_short.then(|| self.plan.makespan()))
     }
 
     /// Tries one more order. False if nothing near the best one is left to try.
@@ -496,7 +536,8 @@ mod tests {
                 ..scene::GenerateOptions::default()
             };
             let scene = scene::generate(&options).unwrap().scene;
-            let mut solver = Solver::new(&scene, &Settings::default()).unwrap();
+            let mut solver =
+                Solver::new(&scene, &Settings::default(), &Situation::at_start(&scene)).unwrap();
             (0..5).find_map(|attempt| solver.first(&scene, attempt));
             for _ in 0..10 {
                 solver.improve(&scene);

@@ -9,6 +9,7 @@ use std::rc::Rc;
 use scene::{ROBOT_ALONE, Scene, Vec2};
 
 use crate::anytime::ground::{Ground, Time};
+use crate::anytime::situation::Situation;
 use crate::frontier::NOWHERE;
 
 /// A place of one object: at rest there, grasped there.
@@ -39,8 +40,12 @@ pub(crate) enum Deed {
 /// What a robot does.
 #[derive(Clone, Debug)]
 pub(crate) struct Track {
-    /// Where it begins.
+    /// The lattice point where it begins.
     pub(crate) start: u32,
+    /// Where it stands then, m.
+    pub(crate) from: Vec2,
+    /// It takes no part: it is an obstacle.
+    pub(crate) is_gone: bool,
     pub(crate) deeds: Vec<Deed>,
     /// Where the object stands at each grip.
     pub(crate) stops: Vec<Rc<Place>>,
@@ -69,8 +74,8 @@ pub(crate) struct Move {
 pub(crate) struct Start {
     /// By robot, what it does whatever is planned: at first, nothing. It holds nothing after that.
     pub(crate) robots: Vec<Track>,
-    /// Where objects stand before that.
-    pub(crate) objects: Vec<Rc<Place>>,
+    /// Where objects stand before that, and how often each was put down.
+    pub(crate) objects: Vec<(Rc<Place>, u32)>,
 }
 
 /// Where an object is left by the last move of it.
@@ -97,6 +102,16 @@ impl Place {
     /// Whether a robot can stand where it is grasped.
     pub(crate) fn is_open(&self) -> bool {
         self.grasp != NOWHERE
+    }
+
+    /// The place of an object that nobody can move, and that hinders as its holder does.
+    pub(crate) fn out_of_reach(ground: &Ground, at: Vec2) -> Rc<Self> {
+        Rc::new(Self {
+            at,
+            grasp: NOWHERE,
+            cells: vec![Vec::new(); ground.classes],
+            bare: Vec::new(),
+        })
     }
 
     /// The place of `object` with its centre at `at`.
@@ -128,10 +143,12 @@ impl Place {
 }
 
 impl Track {
-    /// Nothing done, at this cell.
-    pub(crate) fn parked(cell: u32) -> Self {
+    /// Nothing done, at this cell, from where it stands.
+    pub(crate) fn parked(cell: u32, from: Vec2) -> Self {
         Self {
             start: cell,
+            from,
+            is_gone: false,
             deeds: Vec::new(),
             stops: Vec::new(),
             kept: 0,
@@ -155,6 +172,8 @@ impl Track {
         }
         Self {
             start: self.start,
+            from: self.from,
+            is_gone: self.is_gone,
             deeds,
             stops: self.stops[..grips].to_vec(),
             kept,
@@ -182,21 +201,55 @@ impl Track {
 }
 
 impl Start {
-    /// Everybody where it is, nothing done.
-    pub(crate) fn new(cells: &[u32], objects: Vec<Rc<Place>>) -> Self {
-        Self {
-            robots: cells.iter().map(|&cell| Track::parked(cell)).collect(),
+    /// As the situation is; what robots hold they put down first. None if some robot cannot be
+    /// joined to the lattice.
+    pub(crate) fn new(scene: &Scene, ground: &Ground, situation: &Situation) -> Option<Self> {
+        let objects = (situation.objects.iter().enumerate())
+            .map(|(object, state)| {
+                let place = if state.is_movable {
+                    Place::of(scene, ground, object, state.at)
+                } else {
+                    Place::out_of_reach(ground, state.at)
+                };
+                (place, state.put_downs)
+            })
+            .collect::<Vec<_>>();
+        let robots = situation.robots.iter().map(|robot| {
+            if !robot.is_live {
+                return Some(Track {
+                    is_gone: true,
+                    ..Track::parked(0, robot.at)
+                });
+            }
+            let Some(object) = robot.holds else {
+                let cell = ground.entry(scene, &[ROBOT_ALONE.0], robot.at, &[])?;
+                return Some(Track::parked(cell, robot.at));
+            };
+            let place = Rc::clone(&objects[object].0);
+            if !place.is_open() {
+                return None;
+            }
+            let mut track = Track::parked(place.grasp, robot.at);
+            let down = ground.release;
+            track.deeds.push(Deed::Released(object as u32, down));
+            track.stops.push(place);
+            (track.kept, track.tail) = (1, 1);
+            (track.free.1, track.end.1) = (down, down);
+            Some(track)
+        });
+        Some(Self {
+            robots: robots.collect::<Option<Vec<_>>>()?,
             objects,
-        }
+        })
     }
 
     /// Where objects stand after what robots do whatever is planned, and since when.
     pub(crate) fn rests(&self) -> Vec<Rest> {
         let mut rests: Vec<Rest> = (self.objects.iter())
-            .map(|place| Rest {
+            .map(|(place, turns)| Rest {
                 place: Rc::clone(place),
                 since: 0,
-                turns: 0,
+                turns: *turns,
                 grasped: None,
             })
             .collect();

@@ -1,0 +1,114 @@
+//! Where everything stands when planning begins: as the scene says, or as a run has come to.
+//!
+//! Responsible for: reading that out of a snapshot, and when a snapshot stands still enough to be
+//! planned from.
+//! Not responsible for: the plan (`solver`).
+
+use scene::{Body, Scene, Shape, Vec2, vec};
+use shm_types::{Activity, WorldSnapshot, index};
+
+/// A robot.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RobotAt {
+    /// Its centre, m.
+    pub(crate) at: Vec2,
+    pub(crate) holds: Option<usize>,
+    /// One that is not stays where it is, with what it holds.
+    pub(crate) is_live: bool,
+    /// Actions granted to it so far.
+    pub(crate) actions: u32,
+}
+
+/// An object.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ObjectAt {
+    /// Its centre, m.
+    pub(crate) at: Vec2,
+    /// How often it has been put down.
+    pub(crate) put_downs: u32,
+    /// Whether anybody can move it: not if a robot holds it that is gone.
+    pub(crate) is_movable: bool,
+}
+
+/// Where everything stands.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Situation {
+    pub(crate) robots: Vec<RobotAt>,
+    pub(crate) objects: Vec<ObjectAt>,
+    /// Whether it is as the scene says.
+    pub(crate) is_start: bool,
+}
+
+impl Situation {
+    /// As the scene says.
+    #[cfg(test)]
+    pub(crate) fn at_start(scene: &Scene) -> Self {
+        let robot = |&at: &Vec2| RobotAt {
+            at,
+            holds: None,
+            is_live: true,
+            actions: 0,
+        };
+        let object = |spec: &scene::ObjectSpec| ObjectAt {
+            at: spec.start,
+            put_downs: 0,
+            is_movable: true,
+        };
+        Self {
+            robots: scene.homes.iter().map(robot).collect(),
+            objects: scene.objects.iter().map(object).collect(),
+            is_start: true,
+        }
+    }
+
+    /// As a snapshot says. It stands still ([`stands_still`]).
+    pub(crate) fn of(snapshot: &WorldSnapshot) -> Self {
+        let robots = &snapshot.robots[..snapshot.header.robot_count as usize];
+        let objects = &snapshot.objects[..snapshot.header.object_count as usize];
+        let robot = |state: &shm_types::RobotState| RobotAt {
+            at: vec(state.position),
+            holds: index(state.holding),
+            is_live: state.live == 1,
+            actions: state.actions,
+        };
+        let object = |state: &shm_types::ObjectState| ObjectAt {
+            at: vec(state.position),
+            put_downs: state.put_downs,
+            is_movable: index(state.holder).is_none_or(|robot| robots[robot].live == 1),
+        };
+        Self {
+            robots: robots.iter().map(robot).collect(),
+            objects: objects.iter().map(object).collect(),
+            is_start: (robots.iter()).all(|robot| robot.live == 1 && robot.actions == 0)
+                && objects.iter().all(|object| object.put_downs == 0),
+        }
+    }
+
+    /// Whether some robot is gone.
+    pub(crate) fn is_short(&self) -> bool {
+        self.robots.iter().any(|robot| !robot.is_live)
+    }
+
+    /// What stands where robots are gone: shapes, and where.
+    pub(crate) fn obstacles(&self, scene: &Scene) -> Vec<(Shape, Vec2)> {
+        let gone = self.robots.iter().filter(|robot| !robot.is_live);
+        gone.flat_map(|robot| {
+            let class = robot
+                .holds
+                .map_or(scene::ROBOT_ALONE, |object| scene.objects[object].class);
+            let body: &Body = scene.body(class);
+            let parts = body.parts.iter();
+            parts.map(|part| (part.bare.clone(), robot.at + part.offset))
+        })
+        .collect()
+    }
+}
+
+/// Whether every robot that takes part stands, with nothing granted ahead and its grip at rest.
+pub(crate) fn stands_still(snapshot: &WorldSnapshot) -> bool {
+    let robots = &snapshot.robots[..snapshot.header.robot_count as usize];
+    let busy = [Activity::Moving.code(), Activity::Gripping.code()];
+    robots
+        .iter()
+        .all(|robot| robot.live == 0 || robot.grant_count == 0 && !busy.contains(&robot.activity))
+}
