@@ -4,11 +4,11 @@
 //! unreachable is found in crate `scene`.
 //! Not responsible for: deciding solvability: that nothing is found proves nothing.
 //!
-//! Why a cycle is a proof: objects are not pushed and have one grasp each, so an object that
-//! stands where another's robot must stand to grasp has to be grasped first (E1), and one whose
-//! goal is where another's robot must stand to release has to be released later (E4). Around a
-//! ring neither can be. That matters as soon as an object that is not at its goal is in the
-//! ring, or waits for it.
+//! Why a cycle is a proof: objects are not pushed, and what hinders one counts only if it can be
+//! held in one way only. So an object that stands where another's robot must stand to grasp has to
+//! be grasped first (E1), and one whose goal is where another's robot must stand to release has to
+//! be released later (E4). Around a ring neither can be. That matters as soon as an object that is
+//! not at its goal is in the ring, or waits for it.
 
 use scene::{Budget, CONTACT_M, CycleKind, Infeasible, Scene};
 
@@ -60,6 +60,7 @@ fn graph(scene: &Scene, kind: CycleKind) -> PriorityGraph {
     for one in 0..count {
         for two in 0..count {
             if one != two
+                && scene.has_one_grasp(two)
                 && let (Some(first), Some(second)) = (places[one], places[two])
                 && easy::holds(scene, test, (one, first), (two, second))
             {

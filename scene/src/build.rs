@@ -8,7 +8,7 @@ use crate::body::{Body, ClassId};
 use crate::draft::{Draft, ObjectDraft, RobotDraft, ShapeDraft, WallDraft};
 use crate::geometry::Vec2;
 use crate::problem::{Key, Problem};
-use crate::scene::{ObjectSpec, RobotSpec};
+use crate::scene::{Grasp, ObjectSpec, RobotSpec};
 use crate::shape::{Shape, ShapeError};
 
 /// Thickness of the walls around the bounds, m: thicker than any step.
@@ -132,6 +132,12 @@ fn object_spec(object: &ObjectDraft) -> Result<ObjectSpec, ShapeError> {
     Ok(ObjectSpec {
         shape: shape_of(&object.shape)?,
         grasp: vector(object.grasp),
+        grasps: (std::iter::once(&object.grasp).chain(&object.other_grasps))
+            .map(|&grasp| Grasp {
+                offset: vector(grasp),
+                class: ClassId(0),
+            })
+            .collect(),
         pass_under: object.pass_under,
         start: vector(object.start),
         goal: object.goal.map(vector),
@@ -144,20 +150,23 @@ fn assign_classes(robot: &RobotSpec, objects: &mut [ObjectSpec]) -> Vec<Body> {
     let mut classes = vec![Body::robot(&robot.shape, robot.clearance_m)];
     let mut kinds: Vec<(Shape, Vec2)> = Vec::new();
     for object in objects {
-        let known = kinds
-            .iter()
-            .position(|(shape, grasp)| *shape == object.shape && *grasp == object.grasp);
-        let kind = known.unwrap_or_else(|| {
-            kinds.push((object.shape.clone(), object.grasp));
-            classes.push(Body::carrying(
-                &robot.shape,
-                &object.shape,
-                object.grasp,
-                robot.clearance_m,
-            ));
-            kinds.len() - 1
-        });
-        object.class = ClassId(kind + 1);
+        for grasp in &mut object.grasps {
+            let known = kinds
+                .iter()
+                .position(|(shape, offset)| *shape == object.shape && *offset == grasp.offset);
+            let kind = known.unwrap_or_else(|| {
+                kinds.push((object.shape.clone(), grasp.offset));
+                classes.push(Body::carrying(
+                    &robot.shape,
+                    &object.shape,
+                    grasp.offset,
+                    robot.clearance_m,
+                ));
+                kinds.len() - 1
+            });
+            grasp.class = ClassId(kind + 1);
+        }
+        object.class = object.grasps[0].class;
     }
     classes
 }

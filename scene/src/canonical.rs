@@ -89,7 +89,14 @@ fn write_object(out: &mut String, object: &ObjectDraft) -> std::fmt::Result {
         writeln!(out, "goal = {}", list(goal))?;
     }
     writeln!(out, "shape = {}", shape(&object.shape))?;
-    writeln!(out, "grasp = {}", list(&object.grasp))?;
+    if object.other_grasps.is_empty() {
+        writeln!(out, "grasp = {}", list(&object.grasp))?;
+    } else {
+        let grasps: Vec<_> = (std::iter::once(&object.grasp).chain(&object.other_grasps))
+            .copied()
+            .collect();
+        writeln!(out, "grasps = {}", corners(&grasps))?;
+    }
     writeln!(out, "pass_under = {}", object.pass_under)
 }
 

@@ -59,6 +59,8 @@ pub struct ObjectDraft {
     pub shape: ShapeDraft,
     /// Robot centre minus object centre while grasped, m (rule 2).
     pub grasp: [f64; 2],
+    /// Further grasps, likewise.
+    pub other_grasps: Vec<[f64; 2]>,
     /// Whether robots that carry nothing may pass under it while it is on the ground.
     pub pass_under: bool,
     /// Where its centre is at the start.
@@ -166,6 +168,7 @@ impl ObjectDraft {
         Self {
             shape: ShapeDraft::Box([0.4, 0.4]),
             grasp: [0.0, -0.45],
+            other_grasps: Vec::new(),
             pass_under: false,
             start,
             goal,

@@ -81,6 +81,9 @@ struct ObjectDefaults {
     /// the object's −y side.
     #[schemars(with = "Option<[f64; 2]>")]
     grasp: Option<Spanned<Numbers<2>>>,
+    /// Several grasps, any of which will do, in the place of one.
+    #[schemars(with = "Option<Vec<[f64; 2]>>")]
+    grasps: Option<Spanned<Vec<Numbers<2>>>>,
     /// Whether robots that carry nothing may pass under the object while it is on the ground.
     pass_under: Option<bool>,
 }
@@ -120,6 +123,9 @@ struct ObjectTable {
     /// Robot centre minus object centre while grasped, if not that of `[object]`.
     #[schemars(with = "Option<[f64; 2]>")]
     grasp: Option<Spanned<Numbers<2>>>,
+    /// Several grasps, any of which will do, in the place of one.
+    #[schemars(with = "Option<Vec<[f64; 2]>>")]
+    grasps: Option<Spanned<Vec<Numbers<2>>>>,
     /// Whether robots may pass under it, if not as `[object]` says.
     pass_under: Option<bool>,
 }
@@ -219,6 +225,24 @@ impl ScenarioFile {
                 ),
             }
         }
+        for (i, object) in self.objects.iter().enumerate() {
+            let stated = [
+                (&object.grasp, &object.grasps),
+                (&self.object.grasp, &self.object.grasps),
+            ];
+            for (one, several) in stated {
+                let none = several
+                    .as_ref()
+                    .is_some_and(|list| list.get_ref().is_empty());
+                if one.is_some() && several.is_some() {
+                    let message = "stands beside grasp; one of the two will do";
+                    problems.push(Problem::new(Key::Object(i, "grasps"), message));
+                } else if none {
+                    let message = "is empty, but robots have to hold it somehow";
+                    problems.push(Problem::new(Key::Object(i, "grasps"), message));
+                }
+            }
+        }
         let mut before = Vec::new();
         for (i, order) in self.before.iter().enumerate() {
             match (event(order.first.get_ref()), event(order.then.get_ref())) {
@@ -307,13 +331,16 @@ impl ObjectTable {
     fn draft(&self, defaults: &ObjectDefaults, robot: &RobotDraft) -> Option<ObjectDraft> {
         let shape = self.shape.as_ref().or(defaults.shape.as_ref())?;
         let shape = shape.get_ref().clone();
-        let grasp = self
-            .grasp
-            .as_ref()
-            .or(defaults.grasp.as_ref())
-            .map(|grasp| grasp.get_ref().0);
+        let own = stated(self.grasp.as_ref(), self.grasps.as_ref());
+        let all = stated(defaults.grasp.as_ref(), defaults.grasps.as_ref());
+        let grasps = own.or(all).unwrap_or_default();
+        let (grasp, others) = match grasps.split_first() {
+            Some((first, others)) => (*first, others.to_vec()),
+            None => (default_grasp(&robot.shape, &shape), Vec::new()),
+        };
         Some(ObjectDraft {
-            grasp: grasp.unwrap_or_else(|| default_grasp(&robot.shape, &shape)),
+            grasp,
+            other_grasps: others,
             shape,
             pass_under: self.pass_under.or(defaults.pass_under).unwrap_or(false),
             start: self.start.get_ref().0,
@@ -326,11 +353,23 @@ impl ObjectTable {
         let own = match field {
             "goal" => span(self.goal.as_ref()),
             "shape" => span(self.shape.as_ref()).or_else(|| span(defaults.shape.as_ref())),
-            "grasp" => span(self.grasp.as_ref()).or_else(|| span(defaults.grasp.as_ref())),
+            "grasp" | "grasps" => (span(self.grasp.as_ref()))
+                .or_else(|| span(self.grasps.as_ref()))
+                .or_else(|| span(defaults.grasp.as_ref()))
+                .or_else(|| span(defaults.grasps.as_ref())),
             _ => None,
         };
         own.unwrap_or_else(|| self.start.span())
     }
+}
+
+/// The grasps stated: one, or a list of them.
+fn stated(
+    one: Option<&Spanned<Numbers<2>>>,
+    several: Option<&Spanned<Vec<Numbers<2>>>>,
+) -> Option<Vec<[f64; 2]>> {
+    let several = || several.map(|list| list.get_ref().iter().map(|numbers| numbers.0).collect());
+    one.map(|grasp| vec![grasp.get_ref().0]).or_else(several)
 }
 
 /// "0.finish" as task and event.

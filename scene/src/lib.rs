@@ -54,7 +54,7 @@ pub use pieces::{PieceWork, Pieces};
 pub use problem::{Key, Problem, Problems};
 pub use reach::{CycleKind, Flood, Infeasible, certificate, joints};
 pub use scenario::{Located, ScenarioError, parse};
-pub use scene::{ObjectSpec, RobotSpec, Scene};
+pub use scene::{Grasp, ObjectSpec, RobotSpec, Scene};
 pub use schema::json_schema;
 pub use settings::{Compute, HardMode, Method, Performance, Settings};
 pub use shape::{Shape, ShapeError, ShapeOutline};

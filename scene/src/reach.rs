@@ -162,7 +162,8 @@ pub fn joints(scene: &Scene, space: &Occupancy, at: Vec2) -> impl Iterator<Item 
         .chain(around.into_iter().flatten())
 }
 
-/// The first task that the walls alone make infeasible (rule 10), if any.
+/// The first task that the walls alone make infeasible (rule 10), if any. Objects that can be held
+/// in several ways are left out: they may be held in one way first, then in another.
 ///
 /// Cycles of easy constraints (rule 28) are another reason; they are found in crate `planner`.
 #[must_use]
@@ -172,7 +173,7 @@ pub fn certificate(scene: &Scene) -> Option<Infeasible> {
     let exact = scene.lattice.exact;
     for (object, spec) in scene.objects.iter().enumerate() {
         let Some(goal) = spec.goal else { continue };
-        if (goal - spec.start).amax() <= crate::CONTACT_M {
+        if (goal - spec.start).amax() <= crate::CONTACT_M || !scene.has_one_grasp(object) {
             continue;
         }
         if !some_home_reached(scene, &mut space, &mut flood, object, spec.start) {

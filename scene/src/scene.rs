@@ -11,7 +11,7 @@ use shm_types::Counts;
 use crate::body::{Body, ClassId, ROBOT_ALONE};
 use crate::build::Sound;
 use crate::draft::{Draft, Event, Move, UserOrder};
-use crate::geometry::{Vec2, overlap};
+use crate::geometry::{CONTACT_M, Vec2, overlap};
 use crate::lattice::{Lattice, LatticeInput};
 use crate::problem::Problems;
 use crate::raster::Raster;
@@ -38,15 +38,26 @@ pub struct RobotSpec {
 pub struct ObjectSpec {
     /// Shape around the object's centre.
     pub shape: Shape,
-    /// Robot centre minus object centre while grasped, m (rule 2).
+    /// Robot centre minus object centre while grasped, m (rule 2): the first of its grasps.
     pub grasp: Vec2,
+    /// Every grasp.
+    pub grasps: Vec<Grasp>,
     /// Whether robots that carry nothing may pass under it while it is on the ground.
     pub pass_under: bool,
     /// Where its centre is at the start, m.
     pub start: Vec2,
     /// Where its centre shall be, m; none for clutter.
     pub goal: Option<Vec2>,
-    /// Class of a robot that carries it.
+    /// Class of a robot that carries it by its first grasp.
+    pub class: ClassId,
+}
+
+/// One way to hold an object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grasp {
+    /// Robot centre minus object centre, m.
+    pub offset: Vec2,
+    /// Class of a robot that carries the object like that.
     pub class: ClassId,
 }
 
@@ -138,7 +149,23 @@ impl Scene {
         self.classes.len()
     }
 
-    /// Class of a robot that holds this object, or none.
+    /// The grasp by which a robot `offset` (m) from the centre of an object holds it, if there is
+    /// one.
+    #[must_use]
+    pub fn grasp_by(&self, object: usize, offset: Vec2) -> Option<usize> {
+        let grasps = self.objects[object].grasps.iter();
+        let mut near = grasps.map(|grasp| (grasp.offset - offset).norm() <= CONTACT_M);
+        near.position(|near| near)
+    }
+
+    /// Whether an object can be held in one way only. Where it cannot, what hinders one grasp
+    /// proves nothing.
+    #[must_use]
+    pub fn has_one_grasp(&self, object: usize) -> bool {
+        self.objects[object].grasps.len() == 1
+    }
+
+    /// Class of a robot that holds this object by its first grasp, or none.
     #[must_use]
     pub fn class_holding(&self, object: Option<usize>) -> ClassId {
         object.map_or(ROBOT_ALONE, |object| self.objects[object].class)
@@ -159,12 +186,13 @@ impl Scene {
         at + self.objects[object].grasp
     }
 
-    /// Whether the grasp puts the robot under its object: then the object is no obstacle to the
+    /// Whether a grasp puts the robot under its object: then the object is no obstacle to the
     /// robot that comes for it, nor to the one that leaves it.
     #[must_use]
     pub fn lifts_from_below(&self, object: usize) -> bool {
         let spec = &self.objects[object];
-        overlap(&self.robot.shape, spec.grasp, &spec.shape, Vec2::zeros())
+        let mut grasps = spec.grasps.iter();
+        grasps.any(|grasp| overlap(&self.robot.shape, grasp.offset, &spec.shape, Vec2::zeros()))
     }
 
     /// Whether the user's order lets `event` of a task come only after an event of another:
@@ -222,7 +250,7 @@ fn choose_lattice(
     for object in objects {
         for at in [Some(object.start), object.goal].into_iter().flatten() {
             resting.push((object.shape.clone(), at));
-            stops.push(at + object.grasp);
+            stops.extend(object.grasps.iter().map(|grasp| at + grasp.offset));
         }
     }
     let parked: Vec<_> = homes

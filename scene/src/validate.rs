@@ -7,7 +7,7 @@
 use shm_types::capacity::{MAX_OBJECTS, MAX_ROBOTS};
 
 use crate::build::{Sound, build};
-use crate::draft::Draft;
+use crate::draft::{Draft, ObjectDraft};
 use crate::lattice::{Lattice, MAX_LATTICE_POINTS, MAX_RASTER_BYTES};
 use crate::orders::check_orders;
 use crate::overlaps::check_overlaps;
@@ -22,6 +22,8 @@ pub const MAX_SPEED_M_PER_S: f64 = 1_000.0;
 pub const MAX_GRIP_S: f64 = 86_400.0;
 /// Largest clearance, m.
 pub const MAX_CLEARANCE_M: f64 = 10.0;
+/// Most grasps of an object.
+pub const MAX_GRASPS: usize = 8;
 /// Longest name, bytes.
 pub const MAX_NAME_BYTES: usize = 128;
 /// Checks a draft.
@@ -176,6 +178,7 @@ fn check_numbers(draft: &Draft, problems: &mut Vec<Problem>) {
     for (i, object) in draft.objects.iter().enumerate() {
         check_point(problems, Key::Object(i, "start"), object.start);
         check_point(problems, Key::Object(i, "grasp"), object.grasp);
+        check_grasps(problems, i, object);
         if let Some(goal) = object.goal {
             check_point(problems, Key::Object(i, "goal"), goal);
         }
@@ -189,6 +192,26 @@ fn check_numbers(draft: &Draft, problems: &mut Vec<Problem>) {
                 format!("there is no object {}", step.object),
             ));
         }
+    }
+}
+
+fn check_grasps(problems: &mut Vec<Problem>, i: usize, object: &ObjectDraft) {
+    let key = Key::Object(i, "grasps");
+    let mut grasps = vec![object.grasp];
+    for &grasp in &object.other_grasps {
+        check_point(problems, key, grasp);
+        let far = |other: &[f64; 2]| {
+            (grasp[0] - other[0]).hypot(grasp[1] - other[1]) > crate::geometry::CONTACT_M
+        };
+        if !grasps.iter().all(far) {
+            problems.push(Problem::new(key, format!("{grasp:?} is there twice")));
+        }
+        grasps.push(grasp);
+    }
+    if grasps.len() > MAX_GRASPS {
+        let count = grasps.len();
+        let message = format!("are {count}, over the capacity of {MAX_GRASPS}");
+        problems.push(Problem::new(key, message));
     }
 }
 

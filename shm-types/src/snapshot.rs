@@ -187,8 +187,8 @@ pub struct RobotState {
     pub grant_count: u32,
     /// Actions of its schedule that are granted to it, counted from the start of the run.
     pub actions: u32,
-    /// Always 0.
-    pub reserved: u32,
+    /// Which of its grasps the object in its grip is held by, from 0; 0 if there is none.
+    pub grasp: u32,
     /// Corner points of the granted path still ahead, from the next one on: `position`, then
     /// these, is the polyline it will move along. Unused points are zero.
     pub grant: [Point; MAX_PATH_POINTS],

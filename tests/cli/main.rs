@@ -5,6 +5,7 @@
 mod bad_input;
 mod benchmarks;
 mod explain;
+mod grasps;
 mod latency;
 mod processes;
 mod proofs;

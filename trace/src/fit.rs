@@ -168,6 +168,7 @@ pub(crate) fn scene(scene: &SceneRecord) -> Fit {
     for object in &scene.objects {
         outline(&object.shape)?;
         place("grasp", object.grasp)?;
+        (object.other_grasps.iter()).try_for_each(|grasp| place("grasp", *grasp))?;
         place("start", object.start)?;
         object.goal.map_or(Ok(()), |goal| place("goal", goal))?;
     }

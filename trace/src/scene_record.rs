@@ -57,6 +57,9 @@ fn object(object: &scene::ObjectSpec) -> Object {
     Object {
         shape: object.shape.outline().into(),
         grasp: object.grasp.into(),
+        other_grasps: (object.grasps.iter().skip(1))
+            .map(|grasp| grasp.offset.into())
+            .collect(),
         pass_under: object.pass_under,
         start: object.start.into(),
         goal: object.goal.map(Place::from),

@@ -61,7 +61,7 @@ pub(crate) struct Bodies {
 
 impl Bodies {
     pub(crate) fn new(scene: &Scene) -> Self {
-        let classes = scene.objects.iter().map(|o| o.class.0).max().unwrap_or(0) + 1;
+        let classes = scene.class_count();
         Self {
             ground: Ground::new(scene),
             walls: Walls::new(scene),

@@ -7,13 +7,13 @@
 //! first moment of closing the object counts as part of the robot, so that nobody is granted path
 //! under it. Grips take whole ticks, rounded up; one of no duration takes place at once.
 
-use scene::Scene;
+use scene::{ClassId, Scene};
 use shm_types::{EventKind, Grip, TaskStatus};
 
 use crate::bodies::Sweep;
 use crate::broad::Aabb;
 use crate::journal::{Event, Journal};
-use crate::state::{Hand, Robot, is_at};
+use crate::state::{Hand, Robot};
 use crate::step::World;
 
 impl World {
@@ -25,7 +25,10 @@ impl World {
             }
             match (self.robots[i].hand, self.robots[i].link.grip) {
                 (Hand::Empty, Grip::Grasp) => match self.graspable(scene, i) {
-                    Some(object) => self.begin_grasp(scene, i, object, journal),
+                    Some((object, grasp)) => {
+                        self.robots[i].grasp = grasp;
+                        self.begin_grasp(scene, i, object, journal);
+                    }
                     None => self.counters.grips_refused += 1,
                 },
                 (Hand::Holding { object }, Grip::Release) => {
@@ -36,22 +39,22 @@ impl World {
         }
     }
 
-    /// The object robot `i` may grasp where it stands: its claim under the current epoch, with
-    /// nobody else in the place of what it will then carry.
-    fn graspable(&self, scene: &Scene, i: usize) -> Option<usize> {
+    /// The object robot `i` may grasp where it stands, and by which grasp: its claim under the
+    /// current epoch, with nobody else in the place of what it will then carry.
+    fn graspable(&self, scene: &Scene, i: usize) -> Option<(usize, usize)> {
         let robot = &self.robots[i];
         let claim = robot.claim.filter(|c| c.epoch == self.epoch.number)?;
-        let spec = &scene.objects[claim.task];
         let place = self.bodies.ground.place(claim.task)?;
-        (is_at(robot.position, place + spec.grasp) && self.may_carry(scene, i, claim.task))
-            .then_some(claim.task)
+        let grasp = scene.grasp_by(claim.task, robot.position - place)?;
+        let class = scene.objects[claim.task].grasps[grasp].class;
+        (self.may_carry(scene, i, claim.task, class)).then_some((claim.task, grasp))
     }
 
     /// Whether robot `i` with `object` in its grip would stand clear of walls, other objects, and
     /// every other robot's body and granted path.
-    fn may_carry(&self, scene: &Scene, i: usize, object: usize) -> bool {
+    fn may_carry(&self, scene: &Scene, i: usize, object: usize, class: ClassId) -> bool {
         let robot = &self.robots[i];
-        let stand = Sweep::standing(scene.objects[object].class, robot.position);
+        let stand = Sweep::standing(class, robot.position);
         let meets_object = |region: Aabb| {
             let met = self.bodies.ground.find_near(region, |other, at| {
                 let shape = &scene.objects[other].shape;
@@ -139,12 +142,12 @@ impl World {
                 let grasped = &mut self.objects[object];
                 grasped.holder = Some(i);
                 grasped.status = TaskStatus::Held;
-                grasped.position = self.robots[i].position - scene.objects[object].grasp;
+                grasped.position = self.robots[i].place_of(scene, object);
                 journal.event(Event::new(EventKind::Grasped).robot(i).task(object));
                 self.placed();
             }
             Hand::Opening { object, .. } => {
-                self.robots[i].hand = Hand::Empty;
+                (self.robots[i].hand, self.robots[i].grasp) = (Hand::Empty, 0);
                 self.put_down(i, object, journal);
             }
             Hand::Empty | Hand::Holding { .. } => {}
@@ -157,7 +160,7 @@ impl World {
         let robot = &mut self.robots[i];
         match robot.hand {
             Hand::Closing { object, .. } => {
-                robot.hand = Hand::Empty;
+                (robot.hand, robot.grasp) = (Hand::Empty, 0);
                 self.bodies
                     .ground
                     .put(object, self.objects[object].position);

@@ -136,7 +136,7 @@ impl World {
         let robot = &self.robots[i];
         let object = robot.hand.holding()?;
         let held = &self.objects[object];
-        let place = robot.position - scene.objects[object].grasp;
+        let place = robot.place_of(scene, object);
         let agreed = held.holder == Some(i)
             && held.position == place
             && held.status == TaskStatus::Held

@@ -55,7 +55,7 @@ pub(crate) fn advance(
         robot.position = track.end();
         record(i, robot, scene, span, journal);
         if let Some(object) = robot.hand.object() {
-            objects[object].position = robot.position - scene.objects[object].grasp;
+            objects[object].position = robot.place_of(scene, object);
         }
     }
 }
@@ -64,7 +64,7 @@ fn record(i: usize, robot: &Robot, scene: &Scene, span: Span, journal: &mut Jour
     let carried = robot
         .hand
         .object()
-        .map(|object| (object, scene.objects[object].grasp));
+        .map(|object| (object, scene.objects[object].grasps[robot.grasp].offset));
     let pieces = robot.track.corners().len() as u64 - 1;
     let mut start_ns = span.start_ns;
     for (piece, ((_, from), (gone_m, to))) in (1..).zip(robot.track.pieces()) {

@@ -148,6 +148,8 @@ pub(crate) struct PendingFailure {
 pub(crate) struct Robot {
     pub(crate) position: Vec2,
     pub(crate) hand: Hand,
+    /// Which of its grasps the object in its hand is held by; 0 while there is none.
+    pub(crate) grasp: usize,
     pub(crate) claim: Option<Claimed>,
     /// Newest claim refused, so that repeating it is not counted again.
     pub(crate) refused_claim: Option<Claimed>,
@@ -191,6 +193,7 @@ impl Robot {
         Self {
             position: home,
             hand: Hand::Empty,
+            grasp: 0,
             claim: None,
             refused_claim: None,
             leaving: Leaving::default(),
@@ -218,9 +221,14 @@ impl Robot {
 
     /// The class of the body that moves.
     pub(crate) fn class(&self, scene: &Scene) -> ClassId {
-        self.hand
-            .object()
-            .map_or(ROBOT_ALONE, |object| scene.objects[object].class)
+        self.hand.object().map_or(ROBOT_ALONE, |object| {
+            scene.objects[object].grasps[self.grasp].class
+        })
+    }
+
+    /// Where an object in its hand is.
+    pub(crate) fn place_of(&self, scene: &Scene, object: usize) -> Vec2 {
+        self.position - scene.objects[object].grasps[self.grasp].offset
     }
 
     /// Where its granted path ends: where it may have to stay.

@@ -16,6 +16,7 @@ use scene::{
 };
 use shm_types::Counters;
 
+use crate::anytime::track::Place;
 use crate::field::DistanceField;
 use crate::frontier::{DIAGONAL, STRAIGHT};
 use crate::search::DIRECTIONS;
@@ -66,9 +67,9 @@ pub(crate) struct Ground {
     flood: DistanceField,
     pub(crate) offsets: [i32; 8],
     /// Class of a robot that carries each object.
-    pub(crate) carrying: Vec<usize>,
+    carrying: Vec<Vec<usize>>,
     /// Robot's centre minus object's while grasped, m.
-    pub(crate) grasps: Vec<Vec2>,
+    grasps: Vec<Vec<Vec2>>,
     /// Seconds in a unit of time.
     pub(crate) second_per_unit: f64,
     pub(crate) grasp: Time,
@@ -118,8 +119,12 @@ impl Ground {
             height: scene.lattice.height as i32,
             classes,
             offsets: walls[ROBOT_ALONE.0].offsets(),
-            grasps: scene.objects.iter().map(|object| object.grasp).collect(),
-            carrying: scene.objects.iter().map(|object| object.class.0).collect(),
+            grasps: (scene.objects.iter())
+                .map(|object| object.grasps.iter().map(|grasp| grasp.offset).collect())
+                .collect(),
+            carrying: (scene.objects.iter())
+                .map(|object| object.grasps.iter().map(|grasp| grasp.class.0).collect())
+                .collect(),
             walls,
             obstacles,
             masks,
@@ -134,6 +139,22 @@ impl Ground {
 
     pub(crate) fn points(&self) -> usize {
         (self.width * self.height) as usize
+    }
+
+    /// In how many ways an object can be held.
+    pub(crate) fn grasps(&self, object: usize) -> u8 {
+        self.grasps[object].len() as u8
+    }
+
+    /// Class of a robot that carries an object by one of its grasps.
+    #[inline]
+    pub(crate) fn carrying(&self, object: usize, by: u8) -> usize {
+        self.carrying[object][by as usize]
+    }
+
+    /// Where a robot stands that holds an object by the grasp of this place, m.
+    pub(crate) fn stand(&self, object: usize, place: &Place) -> Vec2 {
+        place.at + self.grasps[object][place.by as usize]
     }
 
     /// Where a class of bodies can be among the walls alone.

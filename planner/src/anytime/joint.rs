@@ -76,7 +76,8 @@ pub(crate) struct Joint {
 }
 
 impl Joint {
-    /// None if this lattice is no exact model or has too many points, or there is a user's order.
+    /// None if this lattice is no exact model or has too many points, if there is a user's order, or
+    /// an object that can be held in several ways.
     pub(crate) fn new(
         scene: &Scene,
         ground: &mut Ground,
@@ -85,7 +86,8 @@ impl Joint {
         goals: &[Option<Rc<Place>>],
     ) -> Option<Self> {
         let exact = scene.lattice.exact && scene.robot.clearance_m == 0.0;
-        let exact = exact && scene.before.is_empty();
+        let one_grasp = (0..scene.objects.len()).all(|object| scene.has_one_grasp(object));
+        let exact = exact && scene.before.is_empty() && one_grasp;
         if !exact || ground.points() >= usize::from(NONE) {
             return None;
         }
@@ -201,7 +203,7 @@ impl Joint {
         let (cell, held) = (at[3 * robot], at[3 * robot + 1]);
         let class = match held {
             NONE => ROBOT_ALONE.0,
-            object => ground.carrying[object as usize],
+            object => ground.carrying(object as usize, 0),
         };
         let steps = ground.walls(class).steps(u32::from(cell));
         for direction in 0..4_u8 {
@@ -234,7 +236,7 @@ impl Joint {
                     then[3 * robot + 1] = object as u16;
                     then[3 * robot + 2] = NONE;
                     then[3 * self.robots + object] = NONE;
-                    let class = ground.carrying[object];
+                    let class = ground.carrying(object, 0);
                     // With the object its body may meet who is under it.
                     if self
                         .room(ground, &then, robot, class, u32::from(cell))
@@ -276,7 +278,7 @@ impl Joint {
             }
             let there = match at[3 * other + 1] {
                 NONE => ROBOT_ALONE.0,
-                object => ground.carrying[object as usize],
+                object => ground.carrying(object as usize, 0),
             };
             if ground.meet(class, cell, there, u32::from(at[3 * other])) {
                 return None;

@@ -57,7 +57,7 @@ pub(crate) fn kept(
         }
         // An object that others have moved before must have been put down.
         for deed in &track.deeds[before..end] {
-            if let Deed::Grasped(object, turn, _) = *deed
+            if let Deed::Grasped(object, turn, ..) = *deed
                 && turn > 0
             {
                 open.extend(put_down(tracks, object, turn));

@@ -68,7 +68,7 @@ impl Hops {
             for (_, to) in sequence.iter().filter(|(moved, _)| *moved == object) {
                 list.push(Hop {
                     object,
-                    from,
+                    from: from.held(to.by),
                     to: Rc::clone(to),
                 });
                 from = Rc::clone(to);
@@ -94,7 +94,7 @@ impl Hops {
             for (other, row) in list.iter().zip(&mut between) {
                 row.push(read(&field, other.to.grasp));
             }
-            let field = ground.field(scene, ground.carrying[hop.object], hop.to.grasp);
+            let field = ground.field(scene, ground.carrying(hop.object, hop.to.by), hop.to.grasp);
             let way = read(&field, hop.from.grasp);
             transfer.push(way.saturating_add(ground.grasp + ground.release));
         }
@@ -271,7 +271,10 @@ fn precedence(
             }
         };
         let concerned: Vec<usize> = (0..list.len())
-            .filter(|&number| alone || ground.carrying[list[number].object] == class)
+            .filter(|&number| {
+                let hop = &list[number];
+                alone || ground.carrying(hop.object, hop.to.by) == class
+            })
             .filter(|&number| !hinders(&pieces, &list[number]))
             .collect();
         for (object, &(first, end)) in of.iter().enumerate() {

@@ -168,13 +168,13 @@ impl Plan {
         let (_, _, left) = self.tracks[wanted.robot].free;
         let (moved, nobody) = (self.owner(Some(wanted.object)), self.owner(None));
         let rest = &self.rests[wanted.object];
-        let (alone, carrying) = (ROBOT_ALONE.0, ground.carrying[wanted.object]);
+        let (alone, carrying) = (ROBOT_ALONE.0, ground.carrying(wanted.object, wanted.to.by));
         let mut to =
             |class: usize, cell: u32| Target::Place(cell, ground.field(scene, class, cell));
         [
             Leg {
                 class: alone,
-                target: to(alone, rest.place.grasp),
+                target: to(alone, rest.place.grasps[wanted.to.by as usize]),
                 then: Then::Grasp(rest.since.max(wanted.after.0)),
                 closed: self.closed_by(&[Some(wanted.object), left]),
                 own: [moved, self.owner(left)],
@@ -190,7 +190,7 @@ impl Plan {
                 class: alone,
                 target: to(alone, self.homes[wanted.robot]),
                 then: Then::Stay,
-                closed: wanted.to.bare.clone(),
+                closed: wanted.to.bare.to_vec(),
                 own: [moved, nobody],
             },
         ]
@@ -256,12 +256,12 @@ impl Plan {
                 }
                 JointMove::Grasp(object) => {
                     let rest = &rests[object as usize];
-                    track.stops.push(Rc::clone(&rest.place));
-                    Deed::Grasped(u32::from(object), rest.turns, now)
+                    track.stops.push(rest.place.held(0));
+                    Deed::Grasped(u32::from(object), rest.turns, now, 0)
                 }
                 JointMove::Release(object) => {
                     let rest = &mut rests[object as usize];
-                    let at = ground.at(*cell) - ground.grasps[object as usize];
+                    let at = ground.at(*cell) - scene.objects[object as usize].grasp;
                     rest.place = Place::of(scene, ground, object as usize, at);
                     rest.turns += 1;
                     track.stops.push(Rc::clone(&rest.place));
@@ -330,7 +330,7 @@ impl Plan {
                     cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
                 }
                 Piece::Grip(_) if class == ROBOT_ALONE.0 => {
-                    class = ground.carrying[wanted.object];
+                    class = ground.carrying(wanted.object, wanted.to.by);
                 }
                 Piece::Grip(_) => class = ROBOT_ALONE.0,
             }
@@ -357,7 +357,7 @@ impl Plan {
                 }
             }
         }
-        for &cell in place.cells[ROBOT_ALONE.0].iter().chain(&place.bare) {
+        for &cell in place.cells[ROBOT_ALONE.0].iter().chain(place.bare.iter()) {
             marks[cell as usize] = 1;
         }
         self.go(ground, router, robot, Target::Anywhere(Some(marks.into())))
@@ -461,8 +461,8 @@ impl Plan {
                         cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
                         arrive
                     }
-                    Deed::Grasped(object, _, time) => {
-                        class = ground.carrying[object as usize];
+                    Deed::Grasped(object, _, time, by) => {
+                        class = ground.carrying(object as usize, by);
                         time
                     }
                     Deed::Released(_, time) => {
@@ -568,15 +568,16 @@ impl Plan {
                     } else {
                         let up = end - ground.grasp;
                         self.timeline.leave(ground, &walker, up, number);
-                        let class = ground.carrying[object];
+                        let by = wanted.to.by;
+                        let class = ground.carrying(object, by);
                         walker = self.timeline.enter(ground, owner, class, cell, up);
                         for (class, cells) in rest.place.cells.iter().enumerate() {
                             self.timeline.vacate(class, cells, id, up);
                         }
-                        track.stops.push(Rc::clone(&rest.place));
+                        track.stops.push(rest.place.held(by));
                         track
                             .deeds
-                            .push(Deed::Grasped(object as u32, rest.turns, end));
+                            .push(Deed::Grasped(object as u32, rest.turns, end, by));
                         holds = true;
                     }
                     now = end;
@@ -604,8 +605,8 @@ fn enter(timeline: &mut Timeline, ground: &Ground, owner: Owner, track: &Track) 
                 timeline.step(ground, &mut walker, direction, span, number);
                 cell = cell.wrapping_add_signed(ground.offsets[direction]);
             }
-            Deed::Grasped(object, _, time) => {
-                let class = ground.carrying[object as usize];
+            Deed::Grasped(object, _, time, by) => {
+                let class = ground.carrying(object as usize, by);
                 let up = time - ground.grasp;
                 timeline.leave(ground, &walker, up, number);
                 walker = timeline.enter(ground, owner, class, cell, up);

@@ -227,8 +227,8 @@ fn needs_of(ground: &Ground, plan: &Plan, robot: u32, track: &Track) -> Vec<Need
     for (deed, done) in track.deeds.iter().enumerate() {
         let (direction, depart) = match *done {
             Deed::Step(direction, depart, _) => (direction as usize, depart),
-            Deed::Grasped(object, ..) => {
-                class = ground.carrying[object as usize];
+            Deed::Grasped(object, .., by) => {
+                class = ground.carrying(object as usize, by);
                 continue;
             }
             Deed::Released(..) => {
@@ -261,8 +261,8 @@ fn needs_of(ground: &Ground, plan: &Plan, robot: u32, track: &Track) -> Vec<Need
         for side in sides(ground, cell, direction).into_iter().flatten() {
             look(class, side);
         }
-        if let Some(Deed::Grasped(object, ..)) = track.deeds.get(deed + 1) {
-            look(ground.carrying[*object as usize], next);
+        if let Some(Deed::Grasped(object, .., by)) = track.deeds.get(deed + 1) {
+            look(ground.carrying(*object as usize, *by), next);
         }
         cell = next;
     }
@@ -295,7 +295,7 @@ fn find(plan: &Plan, (object, event): (usize, Event)) -> Option<(usize, usize)> 
         deeds.map(move |(number, deed)| (robot, number, *deed))
     });
     let found = deeds.filter_map(|(robot, number, deed)| match deed {
-        Deed::Grasped(of, _, time) if event != Event::Finish && of as usize == object => {
+        Deed::Grasped(of, _, time, _) if event != Event::Finish && of as usize == object => {
             Some((time, robot, number))
         }
         Deed::Released(of, time) if event == Event::Finish && of as usize == object => {
@@ -322,7 +322,7 @@ fn join(
     (before, kept): (u32, &[u32]),
 ) -> Joined {
     let track = &plan.tracks()[robot];
-    let mut stops = (track.grips()).map(|grip| grip.place.at + ground.grasps[grip.object]);
+    let mut stops = (track.grips()).map(|grip| ground.stand(grip.object, grip.place));
     let mut joined = Joined {
         kept: before,
         actions: Vec::new(),
@@ -370,7 +370,7 @@ fn join(
                 }
                 heading = Some(direction);
             }
-            Deed::Grasped(object, turn, _) => {
+            Deed::Grasped(object, turn, ..) => {
                 let from = stops.next().unwrap_or_else(|| scene.lattice.at(cell));
                 beside = joined.stop(deed, scene, cell, from);
                 joined.grip(deed, from, Grip::Grasp, object, turn);

@@ -21,6 +21,7 @@ use scene::{Event, ROBOT_ALONE, Scene, UserOrder};
 
 use crate::anytime::ground::Ground;
 use crate::anytime::track::Place;
+use crate::frontier::NOWHERE;
 
 /// Floods of the first attempts; later ones may take more.
 const FLOODS_PER_ATTEMPT: u64 = 2_000;
@@ -66,6 +67,8 @@ pub(crate) struct Sequencer {
 
 /// What the way of a stuck object would be without those it crosses.
 struct Crossing {
+    /// Class of the robot with the object.
+    class: usize,
     crossed: Vec<usize>,
     /// Cells of the robot on its approach and way back, and of the robot with the object.
     alone: Vec<u32>,
@@ -156,7 +159,9 @@ impl Sequencer {
         if open.is_empty() {
             return true;
         }
-        let mut key: Vec<u32> = places.iter().map(|place| place.grasp).collect();
+        let mut key: Vec<u32> = (places.iter())
+            .flat_map(|place| place.grasps.iter().copied())
+            .collect();
         key.push(asides as u32);
         if self.floods > self.most_floods || !self.visited.insert(key) {
             return false;
@@ -168,26 +173,39 @@ impl Sequencer {
             if self.is_early(places, object, Event::Finish) {
                 continue;
             }
-            if self.can_move(ground, places, object, &goal)
-                && self.try_step(scene, ground, places, steps, (object, goal), asides)
-            {
-                return true;
+            for by in 0..ground.grasps(object) {
+                let goal = goal.held(by);
+                if self.can_move(ground, places, object, &goal)
+                    && self.try_step(scene, ground, places, steps, (object, goal), asides)
+                {
+                    return true;
+                }
             }
         }
         let Some(fewer) = asides.checked_sub(1) else {
             return false;
         };
         for &object in open.iter().take(STUCK_LOOKED_AT) {
-            let Some(crossing) = self.crossing(ground, places, object) else {
+            for place in self.regrasps(scene, ground, places, object) {
+                if self.try_step(scene, ground, places, steps, (object, place), fewer) {
+                    return true;
+                }
+            }
+        }
+        let stuck = open.iter().take(STUCK_LOOKED_AT);
+        for (object, by) in
+            stuck.flat_map(|&object| (0..ground.grasps(object)).map(move |by| (object, by)))
+        {
+            let Some(crossing) = self.crossing(ground, places, object, by) else {
                 continue;
             };
             // What is to be set aside may itself be shut in.
             let mut crossed = crossing.crossed.clone();
             for &aside in &crossing.crossed {
-                let (homes, grasp) = (self.homes.clone(), places[aside].grasp);
-                if !places[aside].is_open() {
+                let homes = self.homes.clone();
+                let Some(grasp) = places[aside].open_grasps().next() else {
                     continue;
-                }
+                };
                 let alone = ROBOT_ALONE.0;
                 self.cheapest(ground, places, aside, alone, &homes, grasp, &mut crossed);
             }
@@ -196,7 +214,7 @@ impl Sequencer {
                 crossed.shuffle(&mut self.random);
             }
             for &aside in &crossed {
-                for place in self.asides(scene, ground, places, object, aside, &crossing) {
+                for place in self.all_asides(scene, ground, places, aside, &crossing) {
                     if self.try_step(scene, ground, places, steps, (aside, place), fewer) {
                         return true;
                     }
@@ -256,18 +274,19 @@ impl Sequencer {
         object: usize,
         to: &Place,
     ) -> bool {
-        let from = &places[object];
-        if !from.is_open() || !to.is_open() {
+        let from = places[object].held(to.by);
+        if from.grasp == NOWHERE || to.grasp == NOWHERE {
             return false;
         }
-        self.block(ground, places, object, ground.carrying[object]);
-        if !self.reaches(ground, ground.carrying[object], &[from.grasp], &[to.grasp]) {
+        let carrying = ground.carrying(object, to.by);
+        self.block(ground, places, object, carrying);
+        if !self.reaches(ground, carrying, &[from.grasp], &[to.grasp]) {
             return false;
         }
         // Somebody has to come from a home and get back to it.
         let homes = std::mem::take(&mut self.homes);
         let mut open: Vec<u32> = homes.clone();
-        for place in [&**from, to] {
+        for place in [&*from, to] {
             self.block(ground, places, object, ROBOT_ALONE.0);
             self.block_cells(&place.bare);
             self.reaches(ground, ROBOT_ALONE.0, &[place.grasp], &[]);
@@ -330,19 +349,20 @@ impl Sequencer {
         false
     }
 
-    /// The cheapest way of a stuck object through others.
+    /// The cheapest way of a stuck object through others, held by one of its grasps.
     fn crossing(
         &mut self,
         ground: &Ground,
         places: &[Rc<Place>],
         object: usize,
+        by: u8,
     ) -> Option<Crossing> {
-        let goal = self.goals[object].clone()?;
-        let from = Rc::clone(&places[object]);
-        if !from.is_open() || !goal.is_open() {
+        let goal = self.goals[object].as_ref()?.held(by);
+        let from = places[object].held(by);
+        if from.grasp == NOWHERE || goal.grasp == NOWHERE {
             return None;
         }
-        let class = ground.carrying[object];
+        let class = ground.carrying(object, by);
         let homes = self.homes.clone();
         let mut crossed = Vec::new();
         let carrying = self.cheapest(
@@ -376,6 +396,7 @@ impl Sequencer {
         crossed.sort_unstable();
         crossed.dedup();
         Some(Crossing {
+            class,
             crossed,
             alone: ways,
             carrying,
@@ -447,19 +468,76 @@ impl Sequencer {
         Some(way)
     }
 
-    /// Places to which an object can be set aside, so that it hinders neither a way nor a goal.
+    /// Places to which an object can be set aside by any of its grasps.
+    fn all_asides(
+        &mut self,
+        scene: &Scene,
+        ground: &Ground,
+        places: &[Rc<Place>],
+        aside: usize,
+        crossing: &Crossing,
+    ) -> Vec<Rc<Place>> {
+        (0..ground.grasps(aside))
+            .flat_map(|by| self.asides(scene, ground, places, (aside, by), crossing, None))
+            .collect()
+    }
+
+    /// Places at which an object can be put down, to be grasped otherwise and brought to its goal.
+    fn regrasps(
+        &mut self,
+        scene: &Scene,
+        ground: &Ground,
+        places: &[Rc<Place>],
+        object: usize,
+    ) -> Vec<Rc<Place>> {
+        let Some(goal) = self.goals[object].clone() else {
+            return Vec::new();
+        };
+        if ground.grasps(object) == 1 || self.is_early(places, object, Event::Finish) {
+            return Vec::new();
+        }
+        let nothing = Crossing {
+            class: ROBOT_ALONE.0,
+            crossed: Vec::new(),
+            alone: Vec::new(),
+            carrying: Vec::new(),
+        };
+        (0..ground.grasps(object))
+            .flat_map(|by| self.asides(scene, ground, places, (object, by), &nothing, Some(&goal)))
+            .collect()
+    }
+
+    /// Whether an object can be brought on from a place by another grasp than that which brought
+    /// it there.
+    fn leads_on(
+        &mut self,
+        ground: &Ground,
+        places: &[Rc<Place>],
+        object: usize,
+        place: &Rc<Place>,
+        goal: &Rc<Place>,
+    ) -> bool {
+        let mut then = places.to_vec();
+        then[object] = Rc::clone(place);
+        (0..ground.grasps(object))
+            .filter(|&by| by != place.by)
+            .any(|by| self.can_move(ground, &then, object, &goal.held(by)))
+    }
+
+    /// Places to which an object, held by one of its grasps, can be set aside, so that it hinders
+    /// neither a way nor a goal.
     fn asides(
         &mut self,
         scene: &Scene,
         ground: &Ground,
         places: &[Rc<Place>],
-        stuck: usize,
-        aside: usize,
+        (aside, by): (usize, u8),
         crossing: &Crossing,
+        onward: Option<&Rc<Place>>,
     ) -> Vec<Rc<Place>> {
-        let class = ground.carrying[aside];
-        let from = Rc::clone(&places[aside]);
-        if !from.is_open() || self.is_early(places, aside, Event::Grasp) {
+        let class = ground.carrying(aside, by);
+        let from = places[aside].held(by);
+        if from.grasp == NOWHERE || self.is_early(places, aside, Event::Grasp) {
             return Vec::new();
         }
         // Everything it can be brought to, nearest first.
@@ -494,11 +572,13 @@ impl Sequencer {
                 if found.len() >= PLACES_TRIED || self.floods > self.most_floods {
                     return found;
                 }
-                let at = scene.lattice.at(cell) - scene.objects[aside].grasp;
-                let place = Place::of(scene, ground, aside, at);
-                if place.is_open()
-                    && self.is_clear(ground, places, stuck, aside, &place, crossing, with_goals)
+                let grasp = scene.objects[aside].grasps[usize::from(by)].offset;
+                let at = scene.lattice.at(cell) - grasp;
+                let place = Place::of(scene, ground, aside, at).held(by);
+                if place.grasp != NOWHERE
+                    && self.is_clear(ground, places, aside, &place, crossing, with_goals)
                     && self.can_move(ground, places, aside, &place)
+                    && onward.is_none_or(|goal| self.leads_on(ground, places, aside, &place, goal))
                 {
                     found.push(place);
                 }
@@ -516,7 +596,6 @@ impl Sequencer {
         &self,
         ground: &Ground,
         places: &[Rc<Place>],
-        stuck: usize,
         aside: usize,
         place: &Place,
         crossing: &Crossing,
@@ -527,16 +606,17 @@ impl Sequencer {
                 .iter()
                 .all(|cell| place.cells[class].binary_search(cell).is_err())
         };
-        let ways = free(ground.carrying[stuck], &crossing.carrying)
+        let ways = free(crossing.class, &crossing.carrying)
             && free(ROBOT_ALONE.0, &crossing.alone)
             && free(ROBOT_ALONE.0, &self.homes);
         let goals = !with_goals
             || (0..places.len()).all(|other| {
-                let class = ground.carrying[other];
-                other == aside
-                    || self.goals[other]
-                        .as_ref()
-                        .is_none_or(|goal| free(class, &[goal.grasp]))
+                let reached = |goal: &Rc<Place>| {
+                    let grasps = goal.grasps.iter().zip(0..);
+                    let mut grasps = grasps.map(|(&cell, by)| (ground.carrying(other, by), cell));
+                    grasps.any(|(class, cell)| free(class, &[cell]))
+                };
+                other == aside || self.goals[other].as_ref().is_none_or(reached)
             });
         ways && goals
     }

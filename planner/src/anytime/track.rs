@@ -6,7 +6,7 @@
 
 use std::rc::Rc;
 
-use scene::{ROBOT_ALONE, Scene, Vec2};
+use scene::{Grasp, ROBOT_ALONE, Scene, Vec2};
 
 use crate::anytime::ground::{Ground, Time};
 use crate::anytime::situation::Situation;
@@ -17,13 +17,17 @@ use crate::frontier::NOWHERE;
 pub(crate) struct Place {
     /// Centre of the object, m.
     pub(crate) at: Vec2,
-    /// Where the robot grasps it: the lattice point, or the one next to it; [`NOWHERE`] if no robot
-    /// can stand there.
+    /// By which of its grasps it is brought there, or taken from there.
+    pub(crate) by: u8,
+    /// Where the robot stands then: the lattice point, or the one next to it; [`NOWHERE`] if no
+    /// robot can stand there.
     pub(crate) grasp: u32,
+    /// The same for every grasp.
+    pub(crate) grasps: Rc<[u32]>,
     /// Where it keeps each class of bodies away, sorted.
-    pub(crate) cells: Vec<Vec<u32>>,
+    pub(crate) cells: Rc<[Vec<u32>]>,
     /// Where it keeps a robot that comes for it away, sorted.
-    pub(crate) bare: Vec<u32>,
+    pub(crate) bare: Rc<[u32]>,
 }
 
 /// What a robot does, in order.
@@ -31,8 +35,8 @@ pub(crate) struct Place {
 pub(crate) enum Deed {
     /// A step in a direction, from when to when.
     Step(u8, Time, Time),
-    /// It has grasped this object, which was put down so often before.
-    Grasped(u32, u32, Time),
+    /// It has grasped this object, which was put down so often before, by this grasp.
+    Grasped(u32, u32, Time, u8),
     /// It has put this object down.
     Released(u32, Time),
 }
@@ -99,9 +103,26 @@ pub(crate) struct GripAt<'a> {
 }
 
 impl Place {
-    /// Whether a robot can stand where it is grasped.
+    /// Whether a robot can stand where it is grasped, by one grasp at least.
     pub(crate) fn is_open(&self) -> bool {
-        self.grasp != NOWHERE
+        self.open_grasps().next().is_some()
+    }
+
+    /// Where robots can stand that grasp it.
+    pub(crate) fn open_grasps(&self) -> impl Iterator<Item = u32> + '_ {
+        self.grasps.iter().copied().filter(|&cell| cell != NOWHERE)
+    }
+
+    /// The same place, where it is held by this grasp.
+    pub(crate) fn held(self: &Rc<Self>, by: u8) -> Rc<Self> {
+        if by == self.by {
+            return Rc::clone(self);
+        }
+        Rc::new(Self {
+            by,
+            grasp: self.grasps[by as usize],
+            ..(**self).clone()
+        })
     }
 
     /// The place of an object that nobody can move, and that hinders as its holder does.
@@ -131,13 +152,19 @@ impl Place {
         } else {
             ground.around(scene, ROBOT_ALONE.0, &spec.shape, at, false)
         };
-        let classes = [ROBOT_ALONE.0, spec.class.0];
-        let grasp = ground.entry(scene, &classes, scene.grasp_at(object, at), &bare);
+        let stand = |grasp: &Grasp| {
+            let classes = [ROBOT_ALONE.0, grasp.class.0];
+            let cell = ground.entry(scene, &classes, at + grasp.offset, &bare);
+            cell.unwrap_or(NOWHERE)
+        };
+        let grasps: Rc<[u32]> = spec.grasps.iter().map(stand).collect();
         Rc::new(Self {
             at,
-            grasp: grasp.unwrap_or(NOWHERE),
+            by: 0,
+            grasp: grasps[0],
+            grasps,
             cells,
-            bare,
+            bare: bare.into(),
         })
     }
 }
@@ -187,7 +214,7 @@ impl Track {
     pub(crate) fn grips(&self) -> impl Iterator<Item = GripAt<'_>> {
         let grips = self.deeds.iter().filter_map(|deed| match *deed {
             Deed::Step(..) => None,
-            Deed::Grasped(object, _, time) => Some((time, object as usize, false)),
+            Deed::Grasped(object, _, time, _) => Some((time, object as usize, false)),
             Deed::Released(object, time) => Some((time, object as usize, true)),
         });
         let places = grips.zip(&self.stops);
@@ -286,14 +313,14 @@ impl Deed {
     /// When it begins; of a grip, when it is done.
     pub(crate) fn begin(&self) -> Time {
         match *self {
-            Self::Step(_, time, _) | Self::Grasped(_, _, time) | Self::Released(_, time) => time,
+            Self::Step(_, time, _) | Self::Grasped(_, _, time, _) | Self::Released(_, time) => time,
         }
     }
 
     /// When it is done.
     pub(crate) fn end(&self) -> Time {
         match *self {
-            Self::Step(_, _, time) | Self::Grasped(_, _, time) | Self::Released(_, time) => time,
+            Self::Step(_, _, time) | Self::Grasped(_, _, time, _) | Self::Released(_, time) => time,
         }
     }
 }

@@ -71,11 +71,13 @@ pub struct Bounds {
 
 impl Bounds {
     /// The bounds of a scene at its beginning. None if there is nothing to bring anywhere, some
-    /// task has no path, events wait for one another in a ring, or the scene is beyond the limits.
+    /// task has no path, events wait for one another in a ring, some object can be held in several
+    /// ways, or the scene is beyond the limits.
     #[must_use]
     pub fn of(scene: &Scene, limits: BoundLimits) -> Option<Self> {
         let floods = scene.homes.len() + 4 * scene.objects.len();
-        if floods.saturating_mul(scene.lattice.len()) > limits.points {
+        let one_grasp = (0..scene.objects.len()).all(|object| scene.has_one_grasp(object));
+        if !one_grasp || floods.saturating_mul(scene.lattice.len()) > limits.points {
             return None;
         }
         let grips_s = [scene.robot.grasp_ns, scene.robot.release_ns].map(|ns| ns as f64 / 1e9);

@@ -50,7 +50,10 @@ impl Store {
             work: Counters::default(),
         };
         let places: Vec<_> = Places::at_start(scene).collect();
-        let is_task = |task: &usize| places[*task].is_some_and(|places| places.is_open());
+        // What hinders one grasp of several hinders nobody for certain.
+        let is_task = |task: &usize| {
+            places[*task].is_some_and(|places| places.is_open()) && scene.has_one_grasp(*task)
+        };
         let tasks: Vec<_> = (0..places.len()).filter(is_task).collect();
         store.add_user_order(scene);
         for &task in &tasks {

@@ -8,7 +8,7 @@
 use nalgebra::Vector2;
 
 use super::bodies::{Bodies, SAME_PLACE_M, body_of};
-use super::events::{Context, Events, off_grasp_m};
+use super::events::{Context, Events};
 use super::report::{Findings, Kind, Who};
 use super::rules::Rules;
 use crate::reader::{Close, Span};
@@ -255,7 +255,9 @@ impl Checker {
         let Some(object) = self.rules.hands[robot].holding else {
             return;
         };
-        let off_m = off_grasp_m(&self.scene, &self.bodies, robot, object, time_ns);
+        let (one, other) = (Who::Robot(robot), Who::Object(object));
+        let offset = self.bodies.at(one, time_ns) - self.bodies.at(other, time_ns);
+        let off_m = (offset - self.rules.hands[robot].grasp).norm();
         if off_m > SAME_PLACE_M {
             let (robot, object) = (Who::Robot(robot), Who::Object(object));
             self.findings

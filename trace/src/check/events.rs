@@ -6,6 +6,7 @@
 use nalgebra::Vector2;
 
 use super::bodies::{Bodies, SAME_PLACE_M};
+use super::geometry::Vector;
 use super::report::{Findings, Kind, Who};
 use super::rules::{Grip, Rules};
 use crate::record::{Event, Happening, Instant, Outcome, SceneRecord, TaskInstant};
@@ -56,7 +57,9 @@ impl Events {
             Happening::Grasped { robot, task } => {
                 context.grasp(robot, task);
                 self.reach(task, Instant::Grasp, context);
-                context.rules.grasp(robot, task);
+                let (bodies, time_ns) = (context.bodies, context.time_ns);
+                let (grasp, _) = nearest_grasp(context.scene, bodies, robot, task, time_ns);
+                context.rules.grasp(robot, task, grasp);
             }
             Happening::ReleaseStarted { robot } => {
                 context.rules.hands[robot].grip = Grip::Opening(event.time_ns);
@@ -169,7 +172,7 @@ impl Context<'_> {
                 format!("{robot} grasps {task} while it holds object {held}")
             });
         }
-        let off_m = off_grasp_m(self.scene, self.bodies, robot, task, self.time_ns);
+        let (_, off_m) = nearest_grasp(self.scene, self.bodies, robot, task, self.time_ns);
         if off_m > SAME_PLACE_M {
             self.find(Kind::Grasp, robot, task, |robot, task| {
                 format!("{robot} grasps {task} from {off_m:.6} m beside where its grasp is")
@@ -244,15 +247,15 @@ impl Context<'_> {
     }
 }
 
-/// How far a robot is from where it grasps an object, m.
-pub(super) fn off_grasp_m(
+/// The grasp by which a robot holds an object, and how far it is from it, m.
+pub(super) fn nearest_grasp(
     scene: &SceneRecord,
     bodies: &Bodies,
     robot: usize,
     object: usize,
     time_ns: u64,
-) -> f64 {
-    let grasp: Vector2<f64> = scene.objects[object].grasp.into();
-    let there = bodies.at(Who::Object(object), time_ns) + grasp;
-    (bodies.at(Who::Robot(robot), time_ns) - there).norm()
+) -> (Vector, f64) {
+    let (robot, there) = (Who::Robot(robot), Who::Object(object));
+    let offset = bodies.at(robot, time_ns) - bodies.at(there, time_ns);
+    scene.objects[object].nearest_grasp(offset)
 }

@@ -25,7 +25,7 @@ impl Checker {
         let state = span.states[first].clone();
         self.lost_until = None;
         self.bodies.resume(&state);
-        self.rules.resume(&state);
+        self.rules.resume(&self.scene, &state);
         self.last_state = (state.tick, state.epoch, state.constraints_version);
         self.events.epoch = self.events.epoch.max(state.epoch);
         for robot in 0..self.rules.hands.len() {

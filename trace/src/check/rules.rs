@@ -53,6 +53,8 @@ pub(super) struct Leaving {
 pub(super) struct Hand {
     pub(super) claim: Option<usize>,
     pub(super) holding: Option<usize>,
+    /// The grasp by which it holds that: its centre minus the other, m.
+    pub(super) grasp: Vector2<f64>,
     pub(super) grip: Grip,
     pub(super) leaving: Vec<Leaving>,
 }
@@ -71,14 +73,18 @@ impl Rules {
         let hand = Hand {
             claim: None,
             holding: None,
+            grasp: Vector2::zeros(),
             grip: Grip::Still,
             leaving: Vec::new(),
         };
         let robot = Solid::from(&scene.robot.shape);
         let lifts_from_below = scene.objects.iter().map(|object| {
-            let grasp: Vector2<f64> = object.grasp.into();
             let meeting = Meeting::of(&robot, &Solid::from(&object.shape));
-            meeting.nearer_than(-OVERLAP_M, grasp, grasp).is_some()
+            let mut grasps = std::iter::once(&object.grasp).chain(&object.other_grasps);
+            grasps.any(|grasp| {
+                let grasp = Vector2::from(*grasp);
+                meeting.nearer_than(-OVERLAP_M, grasp, grasp).is_some()
+            })
         });
         Self {
             hands: vec![hand; scene.homes.len()],
@@ -93,11 +99,16 @@ impl Rules {
     }
 
     /// Takes over what a state record says. Who is leaving what, it does not say.
-    pub(super) fn resume(&mut self, state: &State) {
+    pub(super) fn resume(&mut self, scene: &SceneRecord, state: &State) {
         for (hand, robot) in self.hands.iter_mut().zip(&state.robots) {
+            let held = |object: usize| {
+                let offset = Vector2::from(robot.at) - Vector2::from(state.objects[object].at);
+                scene.objects[object].nearest_grasp(offset).0
+            };
             *hand = Hand {
                 claim: robot.task,
                 holding: robot.holding,
+                grasp: robot.holding.map_or_else(Vector2::zeros, held),
                 grip: Grip::Still,
                 leaving: Vec::new(),
             };
@@ -168,8 +179,8 @@ impl Rules {
         }
     }
 
-    /// `robot` takes `object` up.
-    pub(super) fn grasp(&mut self, robot: usize, object: usize) {
+    /// `robot` takes `object` up, by a grasp.
+    pub(super) fn grasp(&mut self, robot: usize, object: usize, grasp: Vector2<f64>) {
         if let Some(other) = self.holders[object].replace(robot) {
             self.hands[other].holding = None;
         }
@@ -178,6 +189,7 @@ impl Rules {
         }
         let hand = &mut self.hands[robot];
         hand.grip = Grip::Still;
+        hand.grasp = grasp;
         hand.claim = Some(object);
         // Whatever path it had been granted towards others is behind it now.
         hand.leaving.retain(|leaving| leaving.was_near);

@@ -3,6 +3,7 @@
 //! Responsible for: the record's parts. Not responsible for: where they come from
 //! (`scene_record`).
 
+use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -60,12 +61,30 @@ pub struct Object {
     pub shape: Outline,
     /// Robot centre minus object centre while it is held.
     pub grasp: Place,
+    /// Other ways to hold it, likewise. Left out where there are none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub other_grasps: Vec<Place>,
     /// Whether robots that carry nothing may pass under it while it stands on the ground.
     pub pass_under: bool,
     /// Where it stands at the start.
     pub start: Place,
     /// Where it is to go; none for clutter.
     pub goal: Option<Place>,
+}
+
+impl Object {
+    /// The grasp by which a robot holds it that is `offset` from its centre (m), or would but for
+    /// so many metres.
+    pub(crate) fn nearest_grasp(&self, offset: Vector2<f64>) -> (Vector2<f64>, f64) {
+        let far = |grasp: &Place| {
+            let grasp = Vector2::from(*grasp);
+            (grasp, (offset - grasp).norm())
+        };
+        let others = self.other_grasps.iter().map(far);
+        others.fold(far(&self.grasp), |best, other| {
+            if other.1 < best.1 { other } else { best }
+        })
+    }
 }
 
 /// An instant in the life of a task.

@@ -99,7 +99,7 @@ impl Room<'_> {
         let mut way = track[begun..]
             .iter()
             .take_while(|motion| motion.start_ns < leg_ns);
-        let own = self.parts(now.holding);
+        let own = self.parts(id, now.holding, time_ns);
         let others = self.others(id, now, time_ns);
         way.find_map(|piece| self.first_on(piece, &own, &others))
     }
@@ -131,10 +131,15 @@ impl Room<'_> {
     }
 
     /// A robot's parts with their offsets from its centre.
-    fn parts(&self, holding: Option<usize>) -> Vec<Part<'_>> {
-        let grasp = |object: usize| Vector::from(self.story.scene.objects[object].grasp);
+    fn parts(&self, id: usize, holding: Option<usize>, time_ns: u64) -> Vec<Part<'_>> {
+        let carried = |object: usize| {
+            let robot = Vector::from(self.story.robot_at(id, time_ns));
+            let offset = robot - Vector::from(self.story.object_at(object, time_ns));
+            let (grasp, _) = self.story.scene.objects[object].nearest_grasp(offset);
+            (&self.objects[object], -grasp)
+        };
         std::iter::once((&self.robot, Vector::zeros()))
-            .chain(holding.map(|object| (&self.objects[object], -grasp(object))))
+            .chain(holding.map(carried))
             .collect()
     }
 
@@ -148,7 +153,7 @@ impl Room<'_> {
             let at = story.robot_at(other, time_ns);
             let granted = entry_at(&robot.grants, time_ns).map_or(&[][..], Vec::as_slice);
             for place in std::iter::once(&at).chain(granted) {
-                for (solid, offset) in self.parts(holding) {
+                for (solid, offset) in self.parts(other, holding, time_ns) {
                     others.push((
                         Blocker::Robot(other),
                         (solid, Vector::from(*place) + offset),

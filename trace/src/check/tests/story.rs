@@ -26,6 +26,7 @@ pub(super) fn scene() -> SceneRecord {
     let object = |x, y, goal: Option<(f64, f64)>| Object {
         shape: square(0.2),
         grasp: Place::new(0.0, -0.45),
+        other_grasps: Vec::new(),
         pass_under: false,
         start: Place::new(x, y),
         goal: goal.map(|(x, y)| Place::new(x, y)),
