@@ -591,7 +591,6 @@ impl Sequencer {
     }
 
     /// Whether an object at a place hinders neither the way of the stuck one nor, if asked, goals.
-    #[expect(clippy::too_many_arguments, reason = "one question")]
     fn is_clear(
         &self,
         ground: &Ground,
