@@ -160,11 +160,15 @@ be at best. docs/explain.md says how to read it.
 Examples:
   rearrange explain swap
   rearrange explain room.toml --robots 2 --json
+  rearrange explain --at 12.5 run.mcap       why each robot stood still then
 
 {STATUSES}"))]
 pub(crate) struct ExplainArgs {
-    /// Scenario file (TOML), or the name of a built-in scenario
+    /// Scenario file (TOML), or the name of a built-in scenario; with --at a trace
     pub(crate) scenario: String,
+    /// Say why each robot stood still at this world time of a trace, s
+    #[arg(long, value_name = "S", value_parser = number(0.0, 1e9), conflicts_with_all = ["robots", "searches"])]
+    pub(crate) at: Option<f64>,
     /// Take only the first M robots
     #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=MAX_ROBOTS))]
     pub(crate) robots: Option<u32>,

@@ -13,7 +13,7 @@
 
 use scene::{ARRIVAL_M, Settings, vec};
 use shm_types::{
-    Action, Activity, Grip, PathRequest, Phase, RobotSchedule, Schedule, StateHash, index,
+    Action, Activity, Grip, PathRequest, Phase, RobotSchedule, Schedule, StateHash, Wait, index,
 };
 
 use crate::account::Doing;
@@ -62,6 +62,7 @@ impl Follower {
             self.started = true;
             intent.take_up(now);
         }
+        intent.waits_for = Wait::NONE;
         let Some(schedule) = now.schedule else {
             intent.claim = select::claim(now, now.holding());
             return (Phase::Selecting, without_schedule(now));
@@ -74,6 +75,7 @@ impl Follower {
             Some(due) if now.me().grant_count == 0 => grip(now, due),
             Some(_) => (under_way(now, next, part), Doing::waiting(u64::MAX)),
             None => {
+                intent.waits_for = waits_for(now, schedule);
                 let doing = self.go_on(now, schedule, intent);
                 (under_way(now, next, part), doing)
             }
@@ -248,7 +250,20 @@ fn batch(now: &Now<'_>, schedule: &Schedule) -> Option<PathRequest> {
 }
 
 fn waits_are_over(now: &Now<'_>, schedule: &Schedule, action: &Action) -> bool {
+    first_wait(now, schedule, action).is_none()
+}
+
+/// The first of an action's waits that is not over.
+fn first_wait(now: &Now<'_>, schedule: &Schedule, action: &Action) -> Option<Wait> {
     let robots = now.snapshot.robots();
-    let mut waits = schedule.waits_of(action).iter();
-    waits.all(|wait| robots[wait.robot as usize].actions >= wait.actions)
+    let is_open = |wait: &Wait| robots[wait.robot as usize].actions < wait.actions;
+    let mut waits = schedule.waits_of(action).iter().copied();
+    waits.find(is_open)
+}
+
+/// What the next action that is not granted waits for.
+fn waits_for(now: &Now<'_>, schedule: &Schedule) -> Wait {
+    let next = schedule.action(now.id, now.me().actions);
+    let wait = next.and_then(|action| first_wait(now, schedule, action));
+    wait.unwrap_or(Wait::NONE)
 }

@@ -3,7 +3,7 @@
 //! Responsible for: the claim, the failure and the path asked for, as they stand.
 //! Not responsible for: why they are so (the phases).
 
-use shm_types::{Claim, Failure, HardRequest, StateHash};
+use shm_types::{Claim, Failure, HardRequest, StateHash, Wait};
 
 use crate::ahead::Ahead;
 use crate::now::Now;
@@ -17,6 +17,8 @@ pub(crate) struct Intent {
     pub(crate) claim: Claim,
     pub(crate) failure: Failure,
     pub(crate) asked: Asked,
+    /// What the next action of its schedule waits for.
+    pub(crate) waits_for: Wait,
     /// What is asked of the planner in this step.
     pub(crate) hard_request: Option<HardRequest>,
     /// Epoch of the newest selection made; 0 is none yet.
@@ -31,6 +33,7 @@ impl Intent {
             claim: Claim::NONE,
             failure: Failure::default(),
             asked: Asked::nothing(),
+            waits_for: Wait::NONE,
             hard_request: None,
             selected_epoch: 0,
         }

@@ -130,6 +130,7 @@ impl Robot {
             activity: doing.activity.code(),
             go: u32::from(doing.go),
             grip: doing.grip.code(),
+            waits_for: self.intent.waits_for,
             claim: self.intent.claim,
             failure: self.intent.failure,
             path: *self.intent.asked.request(),

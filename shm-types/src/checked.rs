@@ -249,6 +249,7 @@ impl Validate for Command {
         Activity::decode(self.activity)?;
         Grip::decode(self.grip)?;
         flag("go", self.go)?;
+        id_or_none("a robot waited for", self.waits_for.robot, counts.robots)?;
         id_or_none("a claimed task", self.claim.task, counts.objects)?;
         FailureCause::decode(self.failure.cause)?;
         id_or_none("a failed task", self.failure.task, counts.objects)?;

@@ -3,7 +3,7 @@
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 use crate::capacity::MAX_PATH_POINTS;
-use crate::{NONE, Point};
+use crate::{NONE, Point, Wait};
 
 /// A claim on a task, or on none. Level-triggered: it stands as long as it is repeated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, FromBytes, IntoBytes, Immutable, KnownLayout)]
@@ -105,6 +105,8 @@ pub struct Command {
     pub go: u32,
     /// A [`crate::Grip`].
     pub grip: u32,
+    /// What the next action of its schedule waits for, or [`Wait::NONE`].
+    pub waits_for: Wait,
     /// Its claim.
     pub claim: Claim,
     /// Its failure.

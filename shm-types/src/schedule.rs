@@ -10,7 +10,7 @@
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 use crate::capacity::{MAX_ACTIONS, MAX_ROBOTS, MAX_WAITS};
-use crate::{Point, StateHash};
+use crate::{NONE, Point, StateHash};
 
 /// A straight piece of way and what the grip does at its end.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, Immutable, KnownLayout)]
@@ -41,6 +41,14 @@ pub struct Wait {
     pub robot: u32,
     /// How many of its actions are granted by then.
     pub actions: u32,
+}
+
+impl Wait {
+    /// For nobody.
+    pub const NONE: Self = Self {
+        robot: NONE,
+        actions: 0,
+    };
 }
 
 /// The part of a schedule that is one robot's.

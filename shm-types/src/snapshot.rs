@@ -6,7 +6,7 @@ use crate::capacity::{
     LAYOUT_VERSION, MAGIC, MAX_OBJECTS, MAX_PATH_POINTS, MAX_ROBOTS, ROBOT_WORDS,
 };
 use crate::id::tag;
-use crate::{NONE, Point, StateHash};
+use crate::{NONE, Point, StateHash, Wait};
 
 tag! {
     /// How the run stands.
@@ -189,6 +189,8 @@ pub struct RobotState {
     pub actions: u32,
     /// Which of its grasps the object in its grip is held by, from 0; 0 if there is none.
     pub grasp: u32,
+    /// What the next action of its schedule waits for, as its newest command said.
+    pub waits_for: Wait,
     /// Corner points of the granted path still ahead, from the next one on: `position`, then
     /// these, is the polyline it will move along. Unused points are zero.
     pub grant: [Point; MAX_PATH_POINTS],
@@ -265,6 +267,7 @@ impl Default for RobotState {
         Self {
             task: NONE,
             holding: NONE,
+            waits_for: Wait::NONE,
             ..zerocopy::FromZeros::new_zeroed()
         }
     }
@@ -308,6 +311,6 @@ impl WorldSnapshot {
     }
 }
 
-const _: () = assert!(size_of::<RobotState>() == 88 + 16 * MAX_PATH_POINTS);
+const _: () = assert!(size_of::<RobotState>() == 96 + 16 * MAX_PATH_POINTS);
 const _: () = assert!(size_of::<ObjectState>() == 112);
 const _: () = assert!(size_of::<WorldSnapshot>() < 200 * 1024);

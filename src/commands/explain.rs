@@ -1,9 +1,11 @@
 //! `rearrange explain`: what has to come before what in a scenario, and why.
 //!
 //! Responsible for: gathering what is known of a scenario as it begins; the words and the JSON.
-//! Not responsible for: finding any of it (crate `planner`).
+//! Not responsible for: finding any of it (crate `planner`), why robots stood still in a run
+//! (`still`).
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use planner::{
     BoundLimits, Bounds, Constraint, Event, Precedence, Proof, Repair, Store, Yardstick,
@@ -13,11 +15,15 @@ use scene::Scene;
 use serde::Serialize;
 
 use crate::cli::ExplainArgs;
+use crate::commands::still;
 use crate::exit::{Exit, Outcome};
 use crate::{output, result, scenario};
 
 /// Explains; status 4 if there is a proof that the scenario has no solution.
 pub(crate) fn main(args: &ExplainArgs) -> Outcome {
+    if let Some(at_s) = args.at {
+        return still::main(Path::new(&args.scenario), at_s, args.json);
+    }
     let scene = scenario::load(&args.scenario, args.robots)?.scene;
     let explanation = Explanation::of(&scene, args.searches);
     if args.json {

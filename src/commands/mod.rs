@@ -12,6 +12,7 @@ mod roles;
 mod run;
 mod scenarios;
 mod schema;
+mod still;
 mod validate;
 mod view;
 

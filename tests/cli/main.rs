@@ -11,6 +11,7 @@ mod processes;
 mod proofs;
 mod rooms;
 mod runs;
+mod still;
 mod streams;
 mod traces;
 mod usage;

@@ -226,6 +226,7 @@ pub(crate) fn state(state: &State, scene: &SceneRecord) -> Fit {
         at,
         task: claimed,
         holding,
+        waits_for,
         grant,
         ..
     } in &state.robots
@@ -237,6 +238,7 @@ pub(crate) fn state(state: &State, scene: &SceneRecord) -> Fit {
             .try_for_each(|corner| place("granted corner", *corner))?;
         claimed.map_or(Ok(()), |claimed| task(claimed, scene))?;
         holding.map_or(Ok(()), |held| task(held, scene))?;
+        waits_for.map_or(Ok(()), |other| robot(other.robot, scene))?;
     }
     for ObjectNow { at, holder, .. } in &state.objects {
         place("place", *at)?;

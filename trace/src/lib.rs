@@ -27,5 +27,5 @@ pub use fit::Unfit;
 pub use reader::{Close, ReadError, Reader, Span};
 pub use record::SceneRecord;
 pub use replay::{Frame, Replay};
-pub use view::{Story, page, still};
+pub use view::{Cause, Standing, Story, page, standing, still};
 pub use writer::{Ending, WriteError, Writer};

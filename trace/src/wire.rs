@@ -9,6 +9,7 @@ use shm_types::{
 
 use crate::record::{
     BodyKind, ConstraintKind, Event, FailureCause, Happening, Motion, ObjectNow, RobotNow, State,
+    WaitsFor,
 };
 
 pub(crate) fn motion(record: &MotionRecord) -> Result<Motion, Invalid> {
@@ -105,6 +106,10 @@ pub(crate) fn state(snapshot: Checked<'_, WorldSnapshot>) -> Result<State, Inval
             holding: index(robot.holding),
             phase: shm_types::Phase::decode(robot.phase)?.into(),
             activity: shm_types::Activity::decode(robot.activity)?.into(),
+            waits_for: index(robot.waits_for.robot).map(|other| WaitsFor {
+                robot: other,
+                action: robot.waits_for.actions,
+            }),
             grant: robot.grant().iter().map(|&corner| corner.into()).collect(),
         })
     };

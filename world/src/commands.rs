@@ -51,6 +51,7 @@ impl World {
         // Checked messages hold only codes that decode.
         link.grip = Grip::decode(command.grip).unwrap_or(Grip::Keep);
         link.phase = Phase::decode(command.phase).unwrap_or(Phase::Idle);
+        link.waits_for = command.waits_for;
         link.activity = Activity::decode(command.activity).unwrap_or(Activity::Idle);
     }
 

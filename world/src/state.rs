@@ -6,7 +6,7 @@
 
 use scene::{ClassId, ROBOT_ALONE, Scene, Vec2};
 use shm_types::capacity::ROBOT_WORDS;
-use shm_types::{Activity, Grip, Phase, TaskStatus};
+use shm_types::{Activity, Grip, Phase, TaskStatus, Wait};
 
 use crate::ActivityTimes;
 use crate::control::FIRST_INCARNATION;
@@ -111,6 +111,8 @@ pub(crate) struct Link {
     pub(crate) grip: Grip,
     pub(crate) phase: Phase,
     pub(crate) activity: Activity,
+    /// What the next action of its schedule waits for.
+    pub(crate) waits_for: Wait,
 }
 
 impl Link {
@@ -126,6 +128,7 @@ impl Link {
             grip: Grip::Keep,
             phase: Phase::Idle,
             activity: Activity::Idle,
+            waits_for: Wait::NONE,
         }
     }
 

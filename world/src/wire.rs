@@ -83,6 +83,7 @@ fn write_robot(out: &mut RobotState, robot: &Robot) {
     out.task = robot.claim.map_or(NONE, |claim| id(claim.task));
     out.holding = robot.hand.holding().map_or(NONE, id);
     out.grasp = id(robot.grasp);
+    out.waits_for = robot.link.waits_for;
     out.phase = robot.link.phase.code();
     out.activity = robot.activity.code();
     out.epoch_free = u32::from(robot.epoch_free);

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 
 pub use event::{ConstraintKind, Event, FailureCause, Happening};
 pub use scene::{Instant, Object, Order, Outline, RobotKind, SceneRecord, TaskInstant, Wall};
-pub use state::{Activity, ObjectNow, Phase, RobotNow, State, TaskStatus};
+pub use state::{Activity, ObjectNow, Phase, RobotNow, State, TaskStatus, WaitsFor};
 
 /// Version of the format this crate writes and reads.
 pub const FORMAT: u32 = 1;

@@ -60,6 +60,15 @@ word! {
     }
 }
 
+/// Whose action a robot waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct WaitsFor {
+    /// Who goes first.
+    pub robot: usize,
+    /// Number of the action that has to be granted to it before, counted from 1.
+    pub action: u32,
+}
+
 /// One robot in a `state` record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotNow {
@@ -73,6 +82,10 @@ pub struct RobotNow {
     pub phase: Phase,
     /// What it did in the tick before.
     pub activity: Activity,
+    /// Methods that plan ahead: whose action has to come before its next one. Left out where there
+    /// is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub waits_for: Option<WaitsFor>,
     /// Corners of the path granted to it and still ahead: `at`, then these, is the way it will
     /// move. Left out where nothing is granted.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -6,10 +6,12 @@
 
 mod easy;
 mod page;
+mod standing;
 mod still;
 mod story;
 mod waits;
 
 pub use page::page;
+pub use standing::{Cause, Standing, standing};
 pub use still::still;
 pub use story::Story;

@@ -12,7 +12,7 @@ use std::io::Read;
 use crate::reader::{Close, ReadError, Reader};
 use crate::record::{
     Activity, BodyKind, End, Event, Gap, Happening, Motion, Phase, Place, RobotNow, SceneRecord,
-    State, TaskStatus,
+    State, TaskStatus, WaitsFor,
 };
 
 /// What a robot is at, from a time on.
@@ -22,6 +22,8 @@ pub(crate) struct RobotDoing {
     pub(crate) activity: Activity,
     pub(crate) task: Option<usize>,
     pub(crate) holding: Option<usize>,
+    /// Whose action has to come before its next one, as its schedule says.
+    pub(crate) waits_for: Option<WaitsFor>,
 }
 
 /// How a task stands, from a time on, and the robot that has claimed it or holds its object.
@@ -267,6 +269,7 @@ fn doing(now: &RobotNow) -> RobotDoing {
         activity: now.activity,
         task: now.task,
         holding: now.holding,
+        waits_for: now.waits_for,
     }
 }
 

@@ -1,7 +1,7 @@
 //! Whom a robot waits for.
 //!
-//! Responsible for: what a waiting robot itself names when it reports failure next (rule 21), and
-//! else the first body in the way that it takes later on, as bodies stand and robots' granted ways
+//! Responsible for: whom its schedule has it wait for, what a waiting robot itself names when it
+//! reports failure next (rule 21), and else the first body in the way that it takes later on, as bodies stand and robots' granted ways
 //! lie while it waits.
 //! Not responsible for: whether it waits (the trace's states say so).
 //!
@@ -91,6 +91,9 @@ impl Room<'_> {
 
     /// The first body on the way that robot `id` takes between `time_ns` and `leg_ns`.
     fn blocker(&self, id: usize, now: &RobotDoing, time_ns: u64, leg_ns: u64) -> Option<Blocker> {
+        if let Some(planned) = now.waits_for {
+            return Some(Blocker::Robot(planned.robot));
+        }
         if let Some(named) = self.named(id, time_ns) {
             return Some(named);
         }

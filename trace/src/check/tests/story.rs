@@ -171,6 +171,7 @@ impl Story {
             holding: hold.filter(|_| id == 0),
             phase: Phase::Idle,
             activity: Activity::Idle,
+            waits_for: None,
             grant: Vec::new(),
         };
         let object = |(id, at): (usize, &Vector2<f64>)| ObjectNow {
