@@ -156,6 +156,7 @@ impl Default for Command {
             claim: Claim::NONE,
             failure: Failure::default(),
             settled_at_change: u64::MAX,
+            waits_for: Wait::NONE,
             ..zerocopy::FromZeros::new_zeroed()
         }
     }
