@@ -93,9 +93,11 @@ impl Situation {
     pub(crate) fn obstacles(&self, scene: &Scene) -> Vec<(Shape, Vec2)> {
         let gone = self.robots.iter().filter(|robot| !robot.is_live);
         gone.flat_map(|robot| {
-            let class = robot
-                .holds
-                .map_or(scene::ROBOT_ALONE, |object| scene.objects[object].class);
+            let class = robot.holds.map_or(scene::ROBOT_ALONE, |object| {
+                let offset = robot.at - self.objects[object].at;
+                let by = scene.grasp_by(object, offset).unwrap_or(0);
+                scene.objects[object].grasps[by].class
+            });
             let body: &Body = scene.body(class);
             let parts = body.parts.iter();
             parts.map(|part| (part.bare.clone(), robot.at + part.offset))

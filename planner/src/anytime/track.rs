@@ -6,6 +6,7 @@
 
 use std::rc::Rc;
 
+use scene::validate::MAX_GRASPS;
 use scene::{Grasp, ROBOT_ALONE, Scene, Vec2};
 
 use crate::anytime::ground::{Ground, Time};
@@ -129,9 +130,11 @@ impl Place {
     pub(crate) fn out_of_reach(ground: &Ground, at: Vec2) -> Rc<Self> {
         Rc::new(Self {
             at,
+            by: 0,
             grasp: NOWHERE,
-            cells: vec![Vec::new(); ground.classes],
-            bare: Vec::new(),
+            grasps: [NOWHERE; MAX_GRASPS].into(),
+            cells: vec![Vec::new(); ground.classes].into(),
+            bare: [].into(),
         })
     }
 
@@ -252,8 +255,10 @@ impl Start {
                 let cell = ground.entry(scene, &[ROBOT_ALONE.0], robot.at, &[])?;
                 return Some(Track::parked(cell, robot.at));
             };
-            let place = Rc::clone(&objects[object].0);
-            if !place.is_open() {
+            let place = &objects[object].0;
+            let by = scene.grasp_by(object, robot.at - place.at).unwrap_or(0);
+            let place = place.held(by as u8);
+            if place.grasp == NOWHERE {
                 return None;
             }
             let mut track = Track::parked(place.grasp, robot.at);
