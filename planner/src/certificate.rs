@@ -48,6 +48,8 @@ fn graph(scene: &Scene, kind: CycleKind) -> PriorityGraph {
     let places: Vec<_> = (scene.objects.iter())
         .map(|object| match (kind, object.goal) {
             (CycleKind::Goals, None) => None,
+            // Another one may stand there in the end, or none.
+            (CycleKind::Goals, _) if object.kind.is_some() => None,
             (_, goal) => Some(Places {
                 initial: object.start,
                 goal: goal.unwrap_or(object.start),
@@ -60,7 +62,7 @@ fn graph(scene: &Scene, kind: CycleKind) -> PriorityGraph {
     for one in 0..count {
         for two in 0..count {
             if one != two
-                && scene.has_one_grasp(two)
+                && scene.is_plain(two)
                 && let (Some(first), Some(second)) = (places[one], places[two])
                 && easy::holds(scene, test, (one, first), (two, second))
             {

@@ -49,6 +49,16 @@ pub(crate) fn build(draft: &Draft, problems: &mut Vec<Problem>) -> Option<Sound>
     }
     let robot = robot?;
     walls.extend(fence?);
+    let mut kinds: Vec<&str> = Vec::new();
+    for (object, stated) in objects.iter_mut().zip(&draft.objects) {
+        object.kind = stated.kind.as_deref().map(|kind| {
+            let known = kinds.iter().position(|known| *known == kind);
+            known.unwrap_or_else(|| {
+                kinds.push(kind);
+                kinds.len() - 1
+            })
+        });
+    }
     let classes = assign_classes(&robot, &mut objects);
     Some(Sound {
         bounds,
@@ -139,6 +149,7 @@ fn object_spec(object: &ObjectDraft) -> Result<ObjectSpec, ShapeError> {
             })
             .collect(),
         pass_under: object.pass_under,
+        kind: None,
         start: vector(object.start),
         goal: object.goal.map(vector),
         class: ClassId(0),

@@ -84,6 +84,9 @@ fn write_draft(out: &mut String, draft: &Draft) -> std::fmt::Result {
 
 fn write_object(out: &mut String, object: &ObjectDraft) -> std::fmt::Result {
     writeln!(out, "\n[[objects]]")?;
+    if let Some(kind) = &object.kind {
+        writeln!(out, "kind = {}", toml::Value::from(kind.as_str()))?;
+    }
     writeln!(out, "start = {}", list(&object.start))?;
     if let Some(goal) = &object.goal {
         writeln!(out, "goal = {}", list(goal))?;

@@ -63,6 +63,8 @@ pub struct ObjectDraft {
     pub other_grasps: Vec<[f64; 2]>,
     /// Whether robots that carry nothing may pass under it while it is on the ground.
     pub pass_under: bool,
+    /// Objects of one kind are interchangeable: any of them may stand at any of their goals.
+    pub kind: Option<String>,
     /// Where its centre is at the start.
     pub start: [f64; 2],
     /// Where its centre shall be; none for clutter.
@@ -169,6 +171,7 @@ impl ObjectDraft {
             shape: ShapeDraft::Box([0.4, 0.4]),
             grasp: [0.0, -0.45],
             other_grasps: Vec::new(),
+            kind: None,
             pass_under: false,
             start,
             goal,

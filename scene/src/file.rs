@@ -117,6 +117,10 @@ struct ObjectTable {
     /// Where its centre shall be; without one it is clutter that may be moved.
     #[schemars(with = "Option<[f64; 2]>")]
     goal: Option<Spanned<Numbers<2>>>,
+    /// Objects of one kind are interchangeable: any of them may stand at any of the goals that they
+    /// state.
+    #[schemars(with = "Option<String>")]
+    kind: Option<Spanned<String>>,
     /// Shape around its centre, if not that of `[object]`.
     #[schemars(with = "Option<ShapeDraft>")]
     shape: Option<Spanned<ShapeDraft>>,
@@ -341,6 +345,7 @@ impl ObjectTable {
         Some(ObjectDraft {
             grasp,
             other_grasps: others,
+            kind: self.kind.as_ref().map(|kind| kind.get_ref().clone()),
             shape,
             pass_under: self.pass_under.or(defaults.pass_under).unwrap_or(false),
             start: self.start.get_ref().0,
@@ -352,6 +357,7 @@ impl ObjectTable {
     fn place(&self, defaults: &ObjectDefaults, field: &str) -> Range {
         let own = match field {
             "goal" => span(self.goal.as_ref()),
+            "kind" => span(self.kind.as_ref()),
             "shape" => span(self.shape.as_ref()).or_else(|| span(defaults.shape.as_ref())),
             "grasp" | "grasps" => (span(self.grasp.as_ref()))
                 .or_else(|| span(self.grasps.as_ref()))

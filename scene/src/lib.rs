@@ -9,6 +9,7 @@
 //! otherwise.
 #![forbid(unsafe_code)]
 
+mod assignment;
 pub mod body;
 mod build;
 pub mod builtin;
@@ -19,6 +20,7 @@ mod file;
 mod furnish;
 pub mod generate;
 pub mod geometry;
+mod kinds;
 pub mod lattice;
 pub mod moves;
 pub mod near;
@@ -39,6 +41,7 @@ pub mod validate;
 mod warehouse;
 pub mod work;
 
+pub use assignment::least_assignment;
 pub use body::{Body, ClassId, Part, ROBOT_ALONE};
 pub use builtin::{BUILTIN, Builtin, builtin, warehouses};
 pub use canonical::to_canonical_toml;

@@ -23,6 +23,9 @@ pub(crate) fn check_orders(draft: &Draft, problems: &mut Vec<Problem>) {
                 Some(object) if object.goal.is_none() => {
                     format!("object {task} has no goal, so there is no task {task}")
                 }
+                Some(object) if object.kind.is_some() => {
+                    format!("object {task} is one of a kind, any of which may be the one that goes")
+                }
                 Some(_) => continue,
             };
             problems.push(Problem::new(key, message));

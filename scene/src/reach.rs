@@ -163,7 +163,8 @@ pub fn joints(scene: &Scene, space: &Occupancy, at: Vec2) -> impl Iterator<Item 
 }
 
 /// The first task that the walls alone make infeasible (rule 10), if any. Objects that can be held
-/// in several ways are left out: they may be held in one way first, then in another.
+/// in several ways are left out: they may be held in one way first, then in another. So are those
+/// that may go to several goals.
 ///
 /// Cycles of easy constraints (rule 28) are another reason; they are found in crate `planner`.
 #[must_use]
@@ -173,7 +174,7 @@ pub fn certificate(scene: &Scene) -> Option<Infeasible> {
     let exact = scene.lattice.exact;
     for (object, spec) in scene.objects.iter().enumerate() {
         let Some(goal) = spec.goal else { continue };
-        if (goal - spec.start).amax() <= crate::CONTACT_M || !scene.has_one_grasp(object) {
+        if (goal - spec.start).amax() <= crate::CONTACT_M || !scene.is_plain(object) {
             continue;
         }
         if !some_home_reached(scene, &mut space, &mut flood, object, spec.start) {

@@ -44,9 +44,12 @@ pub struct ObjectSpec {
     pub grasps: Vec<Grasp>,
     /// Whether robots that carry nothing may pass under it while it is on the ground.
     pub pass_under: bool,
+    /// Number of its kind: objects of one kind are interchangeable.
+    pub kind: Option<usize>,
     /// Where its centre is at the start, m.
     pub start: Vec2,
-    /// Where its centre shall be, m; none for clutter.
+    /// Where its centre shall be, m; none for clutter. Of a kind's, as they are assigned at the
+    /// start.
     pub goal: Option<Vec2>,
     /// Class of a robot that carries it by its first grasp.
     pub class: ClassId,
@@ -110,7 +113,7 @@ impl Scene {
             .iter()
             .map(|body| Raster::of_walls(&lattice, body, &walls))
             .collect();
-        Ok(Self {
+        let mut scene = Self {
             name: draft.name.clone(),
             hash: crate::canonical::hash(&draft),
             bounds,
@@ -124,7 +127,9 @@ impl Scene {
             classes: classes.into(),
             walls_only,
             draft: Arc::new(draft),
-        })
+        };
+        crate::kinds::assign(&mut scene);
+        Ok(scene)
     }
 
     /// What it was made from.
@@ -158,11 +163,11 @@ impl Scene {
         near.position(|near| near)
     }
 
-    /// Whether an object can be held in one way only. Where it cannot, what hinders one grasp
-    /// proves nothing.
+    /// Whether an object can be held in one way only, and go to one goal only. Where it is not so,
+    /// what hinders one grasp, or keeps it from one goal, proves nothing.
     #[must_use]
-    pub fn has_one_grasp(&self, object: usize) -> bool {
-        self.objects[object].grasps.len() == 1
+    pub fn is_plain(&self, object: usize) -> bool {
+        self.objects[object].grasps.len() == 1 && self.objects[object].kind.is_none()
     }
 
     /// Class of a robot that holds this object by its first grasp, or none.

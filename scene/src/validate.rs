@@ -34,6 +34,7 @@ pub(crate) fn validate(draft: &Draft) -> Result<Sound, Problems> {
     let mut problems = Vec::new();
     check_counts(draft, &mut problems);
     check_numbers(draft, &mut problems);
+    check_kinds(draft, &mut problems);
     check_orders(draft, &mut problems);
     let sound = build(draft, &mut problems);
     if problems.is_empty()
@@ -212,6 +213,38 @@ fn check_grasps(problems: &mut Vec<Problem>, i: usize, object: &ObjectDraft) {
         let count = grasps.len();
         let message = format!("are {count}, over the capacity of {MAX_GRASPS}");
         problems.push(Problem::new(key, message));
+    }
+}
+
+/// Objects of a kind are alike.
+fn check_kinds(draft: &Draft, problems: &mut Vec<Problem>) {
+    for (i, object) in draft.objects.iter().enumerate() {
+        let Some(kind) = &object.kind else { continue };
+        let key = Key::Object(i, "kind");
+        if kind.is_empty() || kind.len() > MAX_NAME_BYTES || kind.chars().any(char::is_control) {
+            let message = format!("has 1 to {MAX_NAME_BYTES} bytes and no control characters");
+            problems.push(Problem::new(key, message));
+        }
+        let first = draft
+            .objects
+            .iter()
+            .position(|other| other.kind.as_ref() == Some(kind));
+        let Some(first) = first.filter(|first| *first < i) else {
+            continue;
+        };
+        let alike = |other: &ObjectDraft| {
+            (&other.shape, other.grasp, other.pass_under)
+                == (&object.shape, object.grasp, object.pass_under)
+                && other.other_grasps == object.other_grasps
+        };
+        if !alike(&draft.objects[first]) {
+            let message =
+                format!("is that of object {first} too, whose shape or grasps are others");
+            problems.push(
+                Problem::new(key, message)
+                    .help("objects of a kind are interchangeable, so they have to be alike"),
+            );
+        }
     }
 }
 

@@ -6,6 +6,7 @@ mod bad_input;
 mod benchmarks;
 mod explain;
 mod grasps;
+mod kinds;
 mod latency;
 mod processes;
 mod proofs;

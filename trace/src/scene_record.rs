@@ -61,6 +61,7 @@ fn object(object: &scene::ObjectSpec) -> Object {
             .map(|grasp| grasp.offset.into())
             .collect(),
         pass_under: object.pass_under,
+        kind: object.kind,
         start: object.start.into(),
         goal: object.goal.map(Place::from),
     }

@@ -53,6 +53,7 @@ fn scene() -> SceneRecord {
             shape: square(0.2),
             grasp: Place::new(0.0, -0.45),
             other_grasps: Vec::new(),
+            kind: None,
             pass_under: false,
             start: Place::new(0.5, 0.45),
             goal: Some(Place::new(0.5, 0.95)),

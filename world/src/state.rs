@@ -294,6 +294,8 @@ pub(crate) struct Object {
     /// Where it last stood on the ground.
     pub(crate) rest: Vec2,
     pub(crate) goal: Option<Vec2>,
+    /// Number of its kind: objects of one kind exchange goals.
+    pub(crate) kind: Option<usize>,
     pub(crate) holder: Option<usize>,
     pub(crate) claimed_by: Option<usize>,
     pub(crate) status: TaskStatus,
@@ -311,6 +313,7 @@ impl Object {
             position: start,
             rest: start,
             goal,
+            kind: None,
             holder: None,
             claimed_by: None,
             status: TaskStatus::Waiting,

@@ -80,7 +80,10 @@ impl World {
         let objects: Vec<Object> = scene
             .objects
             .iter()
-            .map(|o| Object::at_start(o.start, o.goal))
+            .map(|o| Object {
+                kind: o.kind,
+                ..Object::at_start(o.start, o.goal)
+            })
             .collect();
         #[expect(clippy::cast_precision_loss, reason = "a tick is far below 2^53 ns")]
         let tick_m = scene.robot.speed_m_per_s * (settings.tick_ns as f64 * 1e-9);

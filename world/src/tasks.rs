@@ -8,7 +8,7 @@ use shm_types::{EventKind, Failure, FailureCause, NONE, TaskStatus, index};
 
 use crate::journal::{Event, Journal};
 use crate::path::ARRIVAL_M;
-use crate::state::{Hand, PendingFailure};
+use crate::state::{Hand, Object, PendingFailure};
 use crate::step::World;
 
 impl World {
@@ -16,6 +16,7 @@ impl World {
     /// completed; elsewhere it goes back to the pool, which opens an epoch too **(ours)**:
     /// nobody could select it otherwise.
     pub(crate) fn put_down(&mut self, i: usize, object: usize, journal: &mut Journal<'_>) {
+        self.exchange_goals(object, journal);
         let put = &mut self.objects[object];
         put.position = place_of(put.position, put.goal);
         put.rest = put.position;
@@ -35,6 +36,32 @@ impl World {
         }
         self.epoch.due = true;
         self.placed();
+    }
+
+    /// An object is put down at the goal of another one of its kind: they exchange goals.
+    fn exchange_goals(&mut self, object: usize, journal: &mut Journal<'_>) {
+        let put = &self.objects[object];
+        let Some(kind) = put.kind else { return };
+        let at = put.position;
+        let is_there = |goal: Vec2| (at - goal).norm() <= ARRIVAL_M;
+        if put.goal.is_some_and(is_there) {
+            return;
+        }
+        let is_its_goal =
+            |other: &Object| other.kind == Some(kind) && other.goal.is_some_and(is_there);
+        let Some(other) = self.objects.iter().position(is_its_goal) else {
+            return;
+        };
+        let goal = self.objects[object].goal;
+        self.objects[object].goal = std::mem::replace(&mut self.objects[other].goal, goal);
+        let left = &mut self.objects[other];
+        if left.status == TaskStatus::Waiting {
+            left.status = left.status_on_ground();
+            if left.status == TaskStatus::Done && goal.is_some() {
+                journal.event(Event::new(EventKind::Completed).task(other));
+                self.epoch.events += 1;
+            }
+        }
     }
 
     /// A grasp, a release or a new constraint: lifts all bars (rule 21).

@@ -77,7 +77,7 @@ pub(crate) struct Joint {
 
 impl Joint {
     /// None if this lattice is no exact model or has too many points, if there is a user's order, or
-    /// an object that can be held in several ways.
+    /// an object that can be held in several ways or exchanged for another.
     pub(crate) fn new(
         scene: &Scene,
         ground: &mut Ground,
@@ -86,8 +86,8 @@ impl Joint {
         goals: &[Option<Rc<Place>>],
     ) -> Option<Self> {
         let exact = scene.lattice.exact && scene.robot.clearance_m == 0.0;
-        let one_grasp = (0..scene.objects.len()).all(|object| scene.has_one_grasp(object));
-        let exact = exact && scene.before.is_empty() && one_grasp;
+        let is_plain = (0..scene.objects.len()).all(|object| scene.is_plain(object));
+        let exact = exact && scene.before.is_empty() && is_plain;
         if !exact || ground.points() >= usize::from(NONE) {
             return None;
         }

@@ -103,6 +103,11 @@ impl Sequencer {
         }
     }
 
+    /// Other goals.
+    pub(crate) fn aim(&mut self, goals: Vec<Option<Rc<Place>>>) {
+        self.goals = goals;
+    }
+
     /// A sequence that leads from these places to the goals. Another attempt rolls other dice, and
     /// takes longer.
     pub(crate) fn find(

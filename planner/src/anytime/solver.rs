@@ -7,6 +7,7 @@ use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashSet};
 use std::rc::Rc;
 
+use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use scene::{ROBOT_ALONE, Scene, Settings};
@@ -187,6 +188,7 @@ impl Solver {
     /// A first plan: a sequence, then its moves by whoever can make them soonest. Other attempts
     /// find other sequences.
     pub(crate) fn first(&mut self, scene: &Scene, attempt: u64) -> Option<Time> {
+        self.assign_goals(scene, attempt);
         let rests = self.start.rests().into_iter().map(|rest| rest.place);
         let objects: Vec<Rc<Place>> = rests.collect();
         let sequence = (self.sequencer).find(scene, &self.ground, &objects, attempt)?;
@@ -197,6 +199,30 @@ impl Solver {
     pub(crate) fn most(&mut self, scene: &Scene) -> Option<Time> {
         let sequence = self.sequencer.most();
         self.begin_with(scene, &sequence)
+    }
+
+    /// Goals of interchangeable objects: as the scene has them in every other attempt, else as the
+    /// dice fall.
+    fn assign_goals(&mut self, scene: &Scene, attempt: u64) {
+        let mut goals = self.goals.clone();
+        let kinds = scene.objects.iter().filter_map(|object| object.kind);
+        let count = kinds.max().map_or(0, |last| last + 1);
+        if count == 0 {
+            return;
+        }
+        for kind in (0..count).filter(|_| attempt % 2 == 1) {
+            let of_kind = |object: &usize| scene.objects[*object].kind == Some(kind);
+            let members: Vec<usize> = (0..goals.len()).filter(of_kind).collect();
+            let mut dealt: Vec<_> = members
+                .iter()
+                .map(|&object| goals[object].clone())
+                .collect();
+            dealt.shuffle(&mut self.random);
+            for (&object, goal) in members.iter().zip(dealt) {
+                goals[object] = goal;
+            }
+        }
+        self.sequencer.aim(goals);
     }
 
     /// A first plan out of a sequence.

@@ -15,14 +15,12 @@
 //!
 //! Source: rule 32; (b)'s assignment by the Hungarian method.
 
-mod matching;
 mod routes;
 mod timing;
 mod yardstick;
 
-use scene::Scene;
+use scene::{Scene, least_assignment};
 
-use crate::bounds::matching::least_assignment;
 use crate::bounds::timing::{Model, Timing};
 use crate::bounds::yardstick::longest_s;
 use crate::legs::{LEG_EXACTNESS, Legs};
@@ -72,12 +70,12 @@ pub struct Bounds {
 impl Bounds {
     /// The bounds of a scene at its beginning. None if there is nothing to bring anywhere, some
     /// task has no path, events wait for one another in a ring, some object can be held in several
-    /// ways, or the scene is beyond the limits.
+    /// ways or be exchanged for another, or the scene is beyond the limits.
     #[must_use]
     pub fn of(scene: &Scene, limits: BoundLimits) -> Option<Self> {
         let floods = scene.homes.len() + 4 * scene.objects.len();
-        let one_grasp = (0..scene.objects.len()).all(|object| scene.has_one_grasp(object));
-        if !one_grasp || floods.saturating_mul(scene.lattice.len()) > limits.points {
+        let is_plain = (0..scene.objects.len()).all(|object| scene.is_plain(object));
+        if !is_plain || floods.saturating_mul(scene.lattice.len()) > limits.points {
             return None;
         }
         let grips_s = [scene.robot.grasp_ns, scene.robot.release_ns].map(|ns| ns as f64 / 1e9);

@@ -50,9 +50,10 @@ impl Store {
             work: Counters::default(),
         };
         let places: Vec<_> = Places::at_start(scene).collect();
-        // What hinders one grasp of several hinders nobody for certain.
+        // What hinders one grasp of several, or the way to one goal of several, hinders nobody for
+        // certain.
         let is_task = |task: &usize| {
-            places[*task].is_some_and(|places| places.is_open()) && scene.has_one_grasp(*task)
+            places[*task].is_some_and(|places| places.is_open()) && scene.is_plain(*task)
         };
         let tasks: Vec<_> = (0..places.len()).filter(is_task).collect();
         store.add_user_order(scene);
@@ -163,7 +164,9 @@ impl Store {
     fn add_overlaps(&mut self, scene: &Scene, places: &[Option<Places>], task: usize) {
         let Some(own) = places[task] else { return };
         for (other, spec) in scene.objects.iter().enumerate() {
-            let goal = places[other].map(|places| places.goal);
+            // Where one of a kind ends is not certain.
+            let goal = places[other].filter(|_| spec.kind.is_none());
+            let goal = goal.map(|places| places.goal);
             let standing = Places {
                 initial: spec.start,
                 goal: goal.unwrap_or(spec.start),
@@ -186,7 +189,10 @@ impl Store {
         let overlaps = self.overlaps_of(leg);
         let mut standing: Vec<_> = (0..scene.objects.len())
             .filter(|&object| object != leg.task())
-            .filter(|&object| !at_goal || scene.objects[object].goal.is_some())
+            .filter(|&object| {
+                let spec = &scene.objects[object];
+                !at_goal || spec.goal.is_some() && spec.kind.is_none()
+            })
             .map(|object| Placement { object, at_goal })
             .filter(|placement| !overlaps.contains(placement))
             .collect();

@@ -77,7 +77,13 @@ impl Checker {
         }
         for (id, object) in self.scene.objects.iter().enumerate() {
             let who = Who::Object(id);
-            if object.goal.is_some_and(|goal| is_off(who, goal)) {
+            let alike =
+                (0..self.scene.objects.len()).filter(|&other| self.scene.is_alike(id, other));
+            let mut alike = alike.map(Who::Object);
+            if object
+                .goal
+                .is_some_and(|goal| alike.all(|other| is_off(other, goal)))
+            {
                 self.findings.add(Kind::Final, time_ns, &[who], || {
                     format!("{who} does not end at its goal")
                 });

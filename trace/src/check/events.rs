@@ -235,10 +235,16 @@ impl Context<'_> {
         let who = Who::Object(task);
         let is_held = self.rules.holders[task].is_some();
         let at = self.bodies.at(who, self.time_ns);
-        let why = match self.scene.objects[task].goal {
-            _ if is_held => "is held",
-            Some(goal) if (at - Vector2::from(goal)).norm() > SAME_PLACE_M => "is not at its goal",
-            _ => return,
+        let alike = (0..self.scene.objects.len()).filter(|&other| self.scene.is_alike(task, other));
+        let mut goals = alike
+            .filter_map(|other| self.scene.objects[other].goal)
+            .peekable();
+        let has_goal = goals.peek().is_some();
+        let is_there = goals.any(|goal| (at - Vector2::from(goal)).norm() <= SAME_PLACE_M);
+        let why = match (is_held, has_goal && !is_there) {
+            (true, _) => "is held",
+            (false, true) => "is not at its goal",
+            (false, false) => return,
         };
         self.findings
             .add(Kind::Completion, self.time_ns, &[who], || {

@@ -66,6 +66,10 @@ pub struct Object {
     pub other_grasps: Vec<Place>,
     /// Whether robots that carry nothing may pass under it while it stands on the ground.
     pub pass_under: bool,
+    /// Number of its kind: objects of one kind may stand at any of their goals. Left out where
+    /// there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kind: Option<usize>,
     /// Where it stands at the start.
     pub start: Place,
     /// Where it is to go; none for clutter.
@@ -84,6 +88,14 @@ impl Object {
         others.fold(far(&self.grasp), |best, other| {
             if other.1 < best.1 { other } else { best }
         })
+    }
+}
+
+impl SceneRecord {
+    /// Whether two objects are interchangeable, or the same.
+    pub(crate) fn is_alike(&self, object: usize, other: usize) -> bool {
+        let kind = self.objects[object].kind;
+        object == other || kind.is_some() && kind == self.objects[other].kind
     }
 }
 

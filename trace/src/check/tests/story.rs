@@ -27,6 +27,7 @@ pub(super) fn scene() -> SceneRecord {
         shape: square(0.2),
         grasp: Place::new(0.0, -0.45),
         other_grasps: Vec::new(),
+        kind: None,
         pass_under: false,
         start: Place::new(x, y),
         goal: goal.map(|(x, y)| Place::new(x, y)),

@@ -1,13 +1,19 @@
 //! The least assignment: each row its own column, at the least sum (the Hungarian method).
 //!
-//! Responsible for: that sum.
+//! Responsible for: the assignment, and its sum.
 //!
 //! Source: Kuhn and Munkres, with the potentials and shortest augmenting paths of Jonker and
 //! Volgenant; O(n³).
 
 /// Least sum of a square matrix of `size` rows, given row by row; infinite entries are not
 /// allowed to be chosen. None if no assignment avoids them.
-pub(crate) fn least_assignment(size: usize, cost: impl Fn(usize, usize) -> f64) -> Option<f64> {
+pub fn least_assignment(size: usize, cost: impl Fn(usize, usize) -> f64) -> Option<f64> {
+    let row_of = assignment(size, &cost)?;
+    Some((0..size).map(|column| cost(row_of[column], column)).sum())
+}
+
+/// By column its row in a least assignment.
+pub(crate) fn assignment(size: usize, cost: &impl Fn(usize, usize) -> f64) -> Option<Vec<usize>> {
     // Column `size` stands for the row that is being brought in.
     let mut row_of = vec![usize::MAX; size + 1];
     let mut row_price = vec![0.0; size];
@@ -51,7 +57,8 @@ pub(crate) fn least_assignment(size: usize, cost: impl Fn(usize, usize) -> f64) 
             column = before;
         }
     }
-    Some((0..size).map(|column| cost(row_of[column], column)).sum())
+    row_of.truncate(size);
+    Some(row_of)
 }
 
 #[cfg(test)]
