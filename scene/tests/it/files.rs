@@ -40,6 +40,7 @@ fn draft() -> impl Strategy<Value = Draft> {
                         grasp: [grasp, -0.0],
                         other_grasps: vec![[grasp, 0.75]; usize::from(has_goal)],
                         pass_under,
+                        kind: has_goal.then(|| format!("no. \"{i}\"")),
                         start: [x, 3.0],
                         goal: (has_goal || i == 0).then_some([x + 0.1, 5.0]),
                     });
