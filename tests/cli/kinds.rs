@@ -79,7 +79,7 @@ start = [2.0, 0.25]
 goal = [4.0, 0.25]
 [[objects]]
 kind = \"pallet\"
-start = [6.0, 0.25]
+start = [6.5, 0.25]
 [[objects]]
 start = [3.0, 0.25]
 grasp = [0.0, 0.5]
@@ -104,8 +104,8 @@ fn where_the_nearest_cannot_be_brought_another_one_is() {
 fn objects_of_a_kind_are_alike_and_have_no_order_of_their_own() {
     for (from, to, words) in [
         (
-            "start = [6.0, 0.25]\n",
-            "start = [6.0, 0.25]\nshape = { box = [0.4, 0.4] }\n",
+            "start = [6.5, 0.25]\n",
+            "start = [6.5, 0.25]\nshape = { box = [0.4, 0.4] }\n",
             "whose shape or grasps are others",
         ),
         (
