@@ -35,8 +35,12 @@ use crate::proof::Proof;
 
 /// Share of the makespan that is spent on improving the plan before anybody moves.
 const PATIENCE: f64 = 0.01;
+/// At most, s: with very many objects one try takes long, and is worth little.
+const MOST_PATIENCE_S: f64 = 1.0;
 /// The same while robots follow it, which costs the run nothing.
 const PATIENCE_UNDER_WAY: f64 = 0.03;
+/// At most, s.
+const MOST_PATIENCE_UNDER_WAY_S: f64 = 10.0;
 /// World time that improving takes between two looks at where robots are, s.
 const ROUND_S: f64 = 0.25;
 /// From when a round begins until robots may follow what it found, beyond its work, s.
@@ -312,6 +316,7 @@ impl Anytime {
         let units = |s: f64| (s * units_per_second as f64) as u64;
         let better = |solver: &Solver, makespan| {
             let worth_s = solver.ground.seconds(makespan) * PATIENCE;
+            let worth_s = worth_s.min(MOST_PATIENCE_S);
             Stage::Better(solver.units() + units(worth_s))
         };
         let most = units_per_second.saturating_mul(MOST_S);
@@ -356,6 +361,7 @@ impl Anytime {
                     self.script = Some(script);
                     is_written = true;
                     let worth_s = solver.ground.seconds(makespan) * PATIENCE_UNDER_WAY;
+                    let worth_s = worth_s.min(MOST_PATIENCE_UNDER_WAY_S);
                     Stage::Follow(solver.units() + units(worth_s))
                 }
             },
