@@ -35,8 +35,9 @@ use crate::proof::Proof;
 
 /// Share of the makespan that is spent on improving the plan before anybody moves.
 const PATIENCE: f64 = 0.01;
-/// At most, s: with very many objects one try takes long, and is worth little.
-const MOST_PATIENCE_S: f64 = 1.0;
+/// It is given up when this much was spent on the first plan and on improving it, s: with very many
+/// objects one try takes long, and saves little.
+const MOST_BEFORE_MOTION_S: f64 = 1.0;
 /// The same while robots follow it, which costs the run nothing.
 const PATIENCE_UNDER_WAY: f64 = 0.03;
 /// At most, s.
@@ -316,8 +317,8 @@ impl Anytime {
         let units = |s: f64| (s * units_per_second as f64) as u64;
         let better = |solver: &Solver, makespan| {
             let worth_s = solver.ground.seconds(makespan) * PATIENCE;
-            let worth_s = worth_s.min(MOST_PATIENCE_S);
-            Stage::Better(solver.units() + units(worth_s))
+            let until = solver.units() + units(worth_s);
+            Stage::Better(until.min(units(MOST_BEFORE_MOTION_S)))
         };
         let most = units_per_second.saturating_mul(MOST_S);
         let mut is_written = false;

@@ -11,7 +11,8 @@
 //!
 //! Terms: an *arrangement* says where each object stands.
 
-use std::collections::{HashSet, VecDeque};
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashSet, VecDeque};
 use std::rc::Rc;
 
 use rand::seq::SliceRandom;
@@ -53,6 +54,8 @@ pub(crate) struct Sequencer {
     from: Vec<u32>,
     round: u32,
     queue: VecDeque<u32>,
+    /// Points to look at, the one nearest to where a way shall lead first.
+    ahead: BinaryHeap<(Reverse<i32>, u32)>,
     visited: HashSet<Vec<u32>>,
     random: ChaCha8Rng,
     /// Whether objects are tried in the order of dice.
@@ -93,6 +96,7 @@ impl Sequencer {
             from: vec![0; points],
             round: 0,
             queue: VecDeque::new(),
+            ahead: BinaryHeap::new(),
             visited: HashSet::new(),
             random: ChaCha8Rng::seed_from_u64(7),
             is_shuffled: false,
@@ -285,10 +289,26 @@ impl Sequencer {
         }
         let carrying = ground.carrying(object, to.by);
         self.block(ground, places, object, carrying);
-        if !self.reaches(ground, carrying, &[from.grasp], &[to.grasp]) {
+        if !self.finds(ground, carrying, from.grasp, to.grasp) {
             return false;
         }
-        // Somebody has to come from a home and get back to it.
+        // Somebody has to come from a home and get back to it: the nearest one is tried first.
+        let far = |home: &&u32| {
+            let (dx, dy) = ground.offset(**home, from.grasp);
+            dx.abs() + dy.abs()
+        };
+        let Some(nearest) = self.homes.iter().min_by_key(far).copied() else {
+            return false;
+        };
+        let mut is_near = true;
+        for place in [&*from, to] {
+            self.block(ground, places, object, ROBOT_ALONE.0);
+            self.block_cells(&place.bare);
+            is_near = is_near && self.finds(ground, ROBOT_ALONE.0, place.grasp, nearest);
+        }
+        if is_near {
+            return true;
+        }
         let homes = std::mem::take(&mut self.homes);
         let mut open: Vec<u32> = homes.clone();
         for place in [&*from, to] {
@@ -320,6 +340,41 @@ impl Sequencer {
         for &cell in cells {
             self.blocked[cell as usize] = self.round;
         }
+    }
+
+    /// Whether `to` can be reached from `from`, as blocked in this round: greedily.
+    fn finds(&mut self, ground: &Ground, class: usize, from: u32, to: u32) -> bool {
+        self.floods += 1;
+        self.ahead.clear();
+        let walls = ground.walls(class);
+        let blocked = |this: &Self, cell: u32| this.blocked[cell as usize] == this.round;
+        if blocked(self, from) || blocked(self, to) || !walls.is_free(from) {
+            return false;
+        }
+        let far = |cell: u32| {
+            let (dx, dy) = ground.offset(cell, to);
+            dx.abs() + dy.abs()
+        };
+        self.seen[from as usize] = self.round;
+        self.ahead.push((Reverse(far(from)), from));
+        while let Some((_, cell)) = self.ahead.pop() {
+            self.cells += 1;
+            if cell == to {
+                return true;
+            }
+            let steps = walls.steps(cell);
+            for direction in 0..4 {
+                let next = cell.wrapping_add_signed(ground.offsets[direction]);
+                if steps >> direction & 1 == 1
+                    && self.seen[next as usize] != self.round
+                    && !blocked(self, next)
+                {
+                    self.seen[next as usize] = self.round;
+                    self.ahead.push((Reverse(far(next)), next));
+                }
+            }
+        }
+        false
     }
 
     /// Whether any of `to` can be reached from any of `from`, as blocked in this round.
@@ -423,15 +478,15 @@ impl Sequencer {
         self.block(ground, places, object, class);
         self.floods += 1;
         let mut best = vec![u32::MAX; ground.points()];
-        let mut open = std::collections::BinaryHeap::new();
+        let mut open = BinaryHeap::new();
         for &cell in from {
             if ground.walls(class).is_free(cell) {
                 best[cell as usize] = 0;
                 self.from[cell as usize] = u32::MAX;
-                open.push((std::cmp::Reverse(0), cell));
+                open.push((Reverse(0), cell));
             }
         }
-        while let Some((std::cmp::Reverse(cost), cell)) = open.pop() {
+        while let Some((Reverse(cost), cell)) = open.pop() {
             if cost > best[cell as usize] {
                 continue;
             }
@@ -453,7 +508,7 @@ impl Sequencer {
                 if cost + price < best[next as usize] {
                     best[next as usize] = cost + price;
                     self.from[next as usize] = cell;
-                    open.push((std::cmp::Reverse(cost + price), next));
+                    open.push((Reverse(cost + price), next));
                 }
             }
         }
