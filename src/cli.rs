@@ -478,6 +478,16 @@ pub(crate) struct SolveArgs {
     /// Wall time after which a run is given up, between two ticks, s
     #[arg(long, value_name = "S", default_value_t = 60.0, value_parser = number(0.001, 1e6))]
     pub(crate) wall_cap: f64,
+    /// The same in rooms that are not known to have a solution: those of the paper's sizes, with
+    /// fewer robots than they were made with
+    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = number(0.001, 1e6))]
+    pub(crate) unknown_cap: f64,
+    /// Rooms of unit cells, whose shortest plans are known [default: 200, with --quick 10]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    pub(crate) unit_cells: Option<u32>,
+    /// Rooms of 16 by 16 unit cells with 4 robots and 20 objects [default: 5, with --quick 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1_000))]
+    pub(crate) halls: Option<u32>,
     /// Rooms that are run at the same time: results do not depend on it, wall times do
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=1_024))]
     pub(crate) threads: u32,

@@ -8,7 +8,9 @@
 //! plan; the *best of the four* is the shortest makespan of the paper's four methods in the same
 //! room.
 
+pub mod cells;
 pub mod figures;
+pub mod optimum;
 pub mod rooms;
 pub mod run;
 pub mod summary;
@@ -55,6 +57,12 @@ pub struct Plan {
     pub max_time_s: f64,
     /// Wall time after which a run is given up, s.
     pub wall_cap_s: f64,
+    /// The same where nobody knows whether there is a plan, s.
+    pub unknown_cap_s: f64,
+    /// Rooms of unit cells with a known optimum.
+    pub unit_cells: usize,
+    /// Large rooms of unit cells.
+    pub halls: usize,
     /// Rooms that are run at the same time.
     pub threads: usize,
 }
@@ -134,20 +142,39 @@ impl Solved {
 /// whatever the number of threads; those that an interruption cut short do not.
 pub fn measure(plan: &Plan, results: &mut Results, progress: &mut dyn Progress) -> Vec<Solved> {
     let rooms = rooms::all(plan);
-    progress.begin(rooms.len() as u64);
+    let name = |room: &Room| room.name.clone();
+    let make = |room: &Room, stop: &AtomicBool| one(room, plan, stop);
+    let (solved, is_partial) = spread(&rooms, plan.threads, progress, name, make);
+    results.partial = is_partial;
+    results
+        .tables
+        .extend([rooms_table(&solved), runs_table(&solved)]);
+    solved
+}
+
+/// Does all jobs on so many threads; what came of them, in their order, without those that an
+/// interruption cut short, and whether there were such.
+fn spread<J: Sync, R: Send>(
+    jobs: &[J],
+    threads: usize,
+    progress: &mut dyn Progress,
+    name: impl Fn(&J) -> String,
+    make: impl Fn(&J, &AtomicBool) -> R + Sync,
+) -> (Vec<R>, bool) {
+    progress.begin(jobs.len() as u64);
     let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
     let (sender, receiver) = mpsc::channel();
-    let mut solved: Vec<(usize, Solved)> = Vec::with_capacity(rooms.len());
+    let mut done: Vec<(usize, R)> = Vec::with_capacity(jobs.len());
     std::thread::scope(|scope| {
-        for _ in 0..plan.threads.max(1) {
-            let (sender, next, stop, rooms) = (sender.clone(), &next, &stop, &rooms);
+        for _ in 0..threads.max(1) {
+            let (sender, next, stop, make) = (sender.clone(), &next, &stop, &make);
             scope.spawn(move || {
                 loop {
                     let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(room) = rooms.get(index) else { break };
-                    let done = one(room, plan, stop);
+                    let Some(job) = jobs.get(index) else { break };
+                    let made = make(job, stop);
                     // The receiver outlives this scope.
-                    if stop.load(Ordering::Relaxed) || sender.send((index, done)).is_err() {
+                    if stop.load(Ordering::Relaxed) || sender.send((index, made)).is_err() {
                         break;
                     }
                 }
@@ -159,22 +186,18 @@ pub fn measure(plan: &Plan, results: &mut Results, progress: &mut dyn Progress) 
                 stop.store(true, Ordering::Relaxed);
             }
             match receiver.recv_timeout(LOOK) {
-                Ok((index, done)) => {
-                    progress.step(&done.room.name);
-                    solved.push((index, done));
+                Ok((index, made)) => {
+                    progress.step(&name(&jobs[index]));
+                    done.push((index, made));
                 }
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => break,
             }
         }
     });
-    results.partial = solved.len() < rooms.len();
-    solved.sort_by_key(|(index, _)| *index);
-    let solved: Vec<_> = solved.into_iter().map(|(_, solved)| solved).collect();
-    results
-        .tables
-        .extend([rooms_table(&solved), runs_table(&solved)]);
-    solved
+    done.sort_by_key(|(index, _)| *index);
+    let is_partial = done.len() < jobs.len();
+    (done.into_iter().map(|(_, made)| made).collect(), is_partial)
 }
 
 /// Makes a room and runs it with every method.
@@ -184,6 +207,11 @@ fn one(room: &Room, plan: &Plan, stop: &AtomicBool) -> Solved {
     let certified = made
         .as_ref()
         .is_ok_and(|scene| check_certificate(scene, &scene.certificate).is_ok());
+    let cap_s = if certified {
+        plan.wall_cap_s
+    } else {
+        plan.wall_cap_s.min(plan.unknown_cap_s)
+    };
     let runs = made.map(|scene| {
         METHODS
             .iter()
@@ -194,7 +222,7 @@ fn one(room: &Room, plan: &Plan, stop: &AtomicBool) -> Solved {
                     time_limit_ns: (plan.max_time_s * 1e9) as u64,
                     ..Settings::default()
                 };
-                let until = Instant::now() + Duration::from_secs_f64(plan.wall_cap_s);
+                let until = Instant::now() + Duration::from_secs_f64(cap_s);
                 run::run(&scene, &settings, until, stop)
             })
             .collect()
@@ -311,6 +339,9 @@ mod tests {
             seed: 1,
             max_time_s: 400.0,
             wall_cap_s: 600.0,
+            unknown_cap_s: 600.0,
+            unit_cells: 0,
+            halls: 0,
             threads,
         }
     }

@@ -263,6 +263,9 @@ mod tests {
             seed: 5,
             max_time_s: 1.0,
             wall_cap_s: 1.0,
+            unknown_cap_s: 1.0,
+            unit_cells: 0,
+            halls: 0,
             threads: 1,
         }
     }

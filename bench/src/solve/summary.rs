@@ -130,6 +130,11 @@ fn shares(solved: &[Solved]) -> Table {
 fn misses(solved: &[Solved]) -> Table {
     let table = Table::new(MISSES, "Rooms that the default method did not solve");
     let mut table = super::rooms::keys(table)
+        .info(
+            "feasible",
+            "",
+            "whether the room is known to have a solution",
+        )
         .info("outcome", "", "how its run ended")
         .info("makespan_s", "s", "world time at its end")
         .info("planning_wall_s", "s", "wall time of planning")
@@ -144,6 +149,7 @@ fn misses(solved: &[Solved]) -> Table {
         let others: Vec<_> = others.map(|(method, _)| method.word()).collect();
         let mut row = one.room.values();
         row.extend([
+            one.feasible_word().into(),
             run.outcome.into(),
             run.makespan_s.into(),
             run.planning_wall_s.into(),
@@ -159,9 +165,11 @@ fn misses(solved: &[Solved]) -> Table {
 struct Ratios {
     to_r: Vec<f64>,
     to_bound: Vec<f64>,
-    /// Rooms, those not solved, and those solved whose R is not known exactly.
+    /// Rooms, those not solved though they have a solution, those not solved that are not known to
+    /// have one, and those solved whose R is not known exactly.
     rooms: usize,
     missed: usize,
+    unknown: usize,
     inexact: usize,
 }
 
@@ -172,13 +180,18 @@ impl Ratios {
             to_bound: Vec::new(),
             rooms: 0,
             missed: 0,
+            unknown: 0,
             inexact: 0,
         };
         let rooms = sets.iter().flat_map(|set| there(solved, *set));
         for one in rooms.filter(|one| one.room.robots == robots) {
             ratios.rooms += 1;
             let Some(makespan_s) = one.makespan_s() else {
-                ratios.missed += 1;
+                if one.is_feasible() {
+                    ratios.missed += 1;
+                } else {
+                    ratios.unknown += 1;
+                }
                 continue;
             };
             match one.r_s() {
@@ -212,7 +225,16 @@ fn ratios(solved: &[Solved]) -> Table {
     )
     .key("robots", "", "number of robots")
     .info("count", "", "rooms")
-    .info("missed", "", "of these, not solved")
+    .info(
+        "missed",
+        "",
+        "of these, not solved though they have a solution",
+    )
+    .info(
+        "unknown",
+        "",
+        "of these, not solved and not known to have a solution",
+    )
     .info(
         "r_inexact",
         "",
@@ -241,6 +263,7 @@ fn ratios(solved: &[Solved]) -> Table {
                 robots.into(),
                 ratios.rooms.into(),
                 ratios.missed.into(),
+                ratios.unknown.into(),
                 ratios.inexact.into(),
                 mean.map(|mean| mean.value).into(),
                 mean.map(|mean| mean.low).into(),
@@ -345,12 +368,13 @@ fn ratio(solved: &[Solved], robots: usize) -> Finding {
         || "no such room".to_owned(),
         |mean| {
             format!(
-                "{:.3} [{:.3}, {:.3}] over {} rooms; {} not solved, {} without an exact R",
+                "{:.3} [{:.3}, {:.3}] over {} rooms; {} missed, {} not known to have a solution, {} without an exact R",
                 mean.value,
                 mean.low,
                 mean.high,
                 ratios.to_r.len(),
                 ratios.missed,
+                ratios.unknown,
                 ratios.inexact
             )
         },

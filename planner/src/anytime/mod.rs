@@ -12,6 +12,7 @@
 //! Unlike what the paper's methods compute with, this allocates while it plans.
 
 mod ground;
+mod improve;
 mod joint;
 mod keep;
 mod order;

@@ -1,21 +1,22 @@
 //! The planner of schedules: a first plan, then better ones.
 //!
-//! Responsible for: what is tried next, and which plan is the best so far.
-//! Not responsible for: committing (`plan`), what is published (`publish`).
+//! Responsible for: first plans, going on from a part of one, which plan is the best so far.
+//! Not responsible for: what is tried to make it better (`improve`), committing (`plan`), what is
+//! published (`publish`).
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashSet};
 use std::rc::Rc;
 
+use rand::SeedableRng;
 use rand::seq::SliceRandom;
-use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use scene::{ROBOT_ALONE, Scene, Settings};
 use shm_types::Verdict;
 
 use crate::anytime::ground::{EVER, Ground, Time};
 use crate::anytime::joint::{Found, Joint, JointMove};
-use crate::anytime::order::{Clocks, Hops, Item, change};
+use crate::anytime::order::{Clocks, Hops, Item};
 use crate::anytime::plan::Plan;
 use crate::anytime::route::Router;
 use crate::anytime::sequence::{Sequencer, Step};
@@ -28,17 +29,13 @@ use crate::anytime::{UNITS_PER_CONFIGURATION, UNITS_PER_INTERVAL};
 const MOST_DISTANCES: usize = 1 << 28;
 /// Configurations that the complete search looks at in one go.
 const CONFIGURATIONS_PER_SLICE: usize = 5_000;
-/// Orders looked at for each one that is tried.
-const LOOKED_AT: usize = 64;
-/// How often in a row nothing may be left to try near the best order until that counts as all.
-const MOST_MISSES: u32 = 30;
 
 /// A plan.
 #[derive(Clone)]
-struct Best {
-    makespan: Time,
+pub(super) struct Best {
+    pub(super) makespan: Time,
     /// The order it came from; empty if it is the complete search's own.
-    order: Vec<Item>,
+    pub(super) order: Vec<Item>,
     tracks: Vec<Track>,
 }
 
@@ -83,22 +80,24 @@ pub(crate) struct Solver {
     router: Router,
     pub(crate) plan: Plan,
     start: Start,
-    homes: Vec<u32>,
+    pub(super) homes: Vec<u32>,
     goals: Vec<Option<Rc<Place>>>,
     sequencer: Sequencer,
     joint: Option<Box<Joint>>,
     /// Configurations that the complete search has seen.
     configurations: u64,
-    hops: Option<Hops>,
-    random: ChaCha8Rng,
-    best: Option<Best>,
+    pub(super) hops: Option<Hops>,
+    pub(super) random: ChaCha8Rng,
+    pub(super) best: Option<Best>,
     /// The one that robots follow.
     followed: Option<Best>,
     /// Where orders are looked for: near this one.
-    current: Vec<Item>,
+    pub(super) current: Vec<Item>,
     /// How often in a row nothing was left to try nearby.
-    misses: u32,
-    tried: HashSet<Vec<Item>>,
+    pub(super) misses: u32,
+    /// How often improving was tried.
+    pub(super) turn: u32,
+    pub(super) tried: HashSet<Vec<Item>>,
     pub(crate) decoded: u64,
     mode: Mode,
     /// Whether the plan begins where the scene does.
@@ -159,6 +158,7 @@ impl Solver {
             followed: None,
             current: Vec::new(),
             misses: 0,
+            turn: 0,
             tried: HashSet::new(),
             decoded: 0,
             mode: MODES[0],
@@ -303,7 +303,7 @@ impl Solver {
     }
 
     /// Keeps the plan as the best one.
-    fn keep(&mut self, makespan: Time, order: Vec<Item>) -> Time {
+    pub(super) fn keep(&mut self, makespan: Time, order: Vec<Item>) -> Time {
         let tracks = self.plan.tracks().to_vec();
         self.best = Some(Best {
             makespan,
@@ -378,7 +378,13 @@ impl Solver {
     }
 
     /// Carries an order out in the plan; how long it takes, if it can be done within `limit`.
-    fn decode(&mut self, scene: &Scene, hops: &Hops, order: &[Item], limit: Time) -> Option<Time> {
+    pub(super) fn decode(
+        &mut self,
+        scene: &Scene,
+        hops: &Hops,
+        order: &[Item],
+        limit: Time,
+    ) -> Option<Time> {
         self.decoded += 1;
         self.plan.begin(&self.ground, &self.start, limit);
         self.plan.leaves_away = self.mode.leaves_away;
@@ -396,61 +402,6 @@ impl Solver {
         let (plan, ground, router) = (&mut self.plan, &mut self.ground, &mut self.router);
         let done = plan.send_all_home(ground, router, scene);
         done.or_else(|| self.is_short.then(|| self.plan.makespan()))
-    }
-
-    /// Tries one more order. False if nothing near the best one is left to try.
-    pub(crate) fn improve(&mut self, scene: &Scene) -> bool {
-        let Some(hops) = self.hops.take() else {
-            return false;
-        };
-        let goes_on = self.improve_with(scene, &hops);
-        self.hops = Some(hops);
-        goes_on
-    }
-
-    fn improve_with(&mut self, scene: &Scene, hops: &Hops) -> bool {
-        let Some(best) = self.best.as_ref().map(|best| best.makespan) else {
-            return false;
-        };
-        let mut chosen: Option<(Time, Vec<Item>)> = None;
-        for attempt in 0..LOOKED_AT {
-            let mut near = self.current.clone();
-            for _ in 0..=attempt % 4 {
-                change(&mut near, self.homes.len(), &mut self.random);
-            }
-            let Some(least) = hops.least(&near) else {
-                continue;
-            };
-            let is_better = chosen.as_ref().is_none_or(|(known, _)| least < *known);
-            if least < best && is_better && !self.tried.contains(&near) {
-                chosen = Some((least, near));
-            }
-        }
-        let Some((_, near)) = chosen else {
-            self.misses += 1;
-            self.go_back();
-            return self.misses < MOST_MISSES;
-        };
-        self.misses = 0;
-        self.tried.insert(near.clone());
-        // A little worse is good enough to go on from: what is better may lie behind it.
-        let limit = best + best / 32;
-        if let Some(makespan) = self.decode(scene, hops, &near, limit) {
-            self.current.clone_from(&near);
-            if makespan < best {
-                self.keep(makespan, near);
-            }
-        } else if self.random.random_range(0..8) == 0 {
-            self.go_back();
-        }
-        true
-    }
-
-    /// Goes on from the best order.
-    fn go_back(&mut self) {
-        if let Some(best) = &self.best {
-            self.current.clone_from(&best.order);
-        }
     }
 
     /// Puts the best plan in place, to be published; how long it takes.
