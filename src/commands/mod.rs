@@ -13,6 +13,7 @@ mod run;
 mod scenarios;
 mod schema;
 mod still;
+mod tell;
 mod validate;
 mod view;
 
@@ -49,6 +50,7 @@ fn dispatch(command: Command) -> Outcome {
         Command::Validate(args) => validate::main(&args),
         Command::Scenarios(args) => scenarios::main(&args),
         Command::List(args) => list::main(&args),
+        Command::Tell(args) => tell::main(&args),
         Command::Bench(args) => bench::main(&args.workload),
         Command::World(args) => roles::main(node::Role::World, &args),
         Command::Planner(args) => roles::main(node::Role::Planner, &args),

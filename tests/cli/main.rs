@@ -14,6 +14,7 @@ mod rooms;
 mod runs;
 mod still;
 mod streams;
+mod tell;
 mod traces;
 mod usage;
 mod views;
