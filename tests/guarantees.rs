@@ -282,10 +282,10 @@ fn compare(rooms: u64, robots: usize) -> (usize, usize) {
             );
         } else {
             not += 1;
-            assert_eq!(
-                (outcome, verdict),
-                (Outcome::Stuck, Verdict::Exhausted),
-                "seed {seed}\n{}",
+            let is_proved = [Verdict::Proved, Verdict::Exhausted].contains(&verdict);
+            assert!(
+                outcome == Outcome::Stuck && is_proved,
+                "seed {seed}: {outcome:?}, {verdict:?}\n{}",
                 room.text()
             );
         }

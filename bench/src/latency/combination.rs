@@ -358,6 +358,6 @@ mod tests {
     fn a_payload_has_all_that_lives() {
         let one = &Combination::all(&options())[0];
         assert_eq!((one.robots, one.objects), (1, 100));
-        assert_eq!(one.payload(), size_of::<SnapshotHeader>() + 600 + 100 * 112);
+        assert_eq!(one.payload(), size_of::<SnapshotHeader>() + 608 + 100 * 112);
     }
 }

@@ -201,7 +201,9 @@ impl Anytime {
 
     /// What was published was refused: goes back to the plan before, or else plans anew.
     pub(crate) fn take_back(&mut self, snapshot: Checked<WorldSnapshot>, out: &mut Schedule) {
-        if let Some(script) = self.replaced.take() {
+        if self.stage != Stage::Stop
+            && let Some(script) = self.replaced.take()
+        {
             let robots = snapshot.robots();
             script.write(|robot| robots[robot].actions, out);
             self.script = Some(script);

@@ -29,7 +29,6 @@ pub(super) const MOST_REQUESTS: usize = 16;
 /// What is known of one robot's process.
 #[derive(Clone, Default)]
 struct Robot {
-    live: bool,
     incarnation: u32,
     /// Whether a command has come at all.
     heard: bool,
@@ -59,7 +58,6 @@ impl Ears {
         let schedules = schedules.map(|service| Tables::new(&service, seat.counts()));
         let constraints = topics.constraints.service(node, Access::Open)?;
         let robot = Robot {
-            live: true,
             incarnation: FIRST_INCARNATION,
             ..Robot::default()
         };
@@ -152,15 +150,10 @@ impl Ears {
             return Ok(tick);
         }
         let robot = &mut self.robots[request.index as usize];
-        if request.kind == ControlKind::Down.code() {
-            robot.live = false;
-        } else if request.kind == ControlKind::Up.code() {
-            robot.live = true;
-            // The process that was there last has been heard all the time.
-            if request.incarnation > 0 && request.incarnation != robot.incarnation {
-                robot.incarnation = request.incarnation;
-                robot.heard = false;
-            }
+        let is_new = request.incarnation > 0 && request.incarnation != robot.incarnation;
+        if request.kind == ControlKind::Up.code() && is_new {
+            robot.incarnation = request.incarnation;
+            robot.heard = false;
         }
         Ok(tick)
     }
@@ -199,12 +192,14 @@ impl Ears {
         }
     }
 
-    /// Whether every live participant has answered `tick`.
+    /// Whether every participant has answered `tick`. A robot that takes part no more has, too: its
+    /// process goes on, so that it may take part again, and is where the others are then. (Where
+    /// a process may be gone, in real time, nobody waits for anybody.)
     pub(super) fn have_answered(&self, tick: u64) -> bool {
         let robots = self
             .robots
             .iter()
-            .all(|robot| !robot.live || (robot.heard && robot.command.tick >= tick));
+            .all(|robot| robot.heard && robot.command.tick >= tick);
         let planner = self.report.is_some_and(|report| report.tick >= tick);
         let recorder = self
             .recorded
