@@ -75,6 +75,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             table: None,
             schedule: None,
             control: &[],
+            change: None,
         };
         world.step(&scene, input, &mut motion);
         // `motion` holds what moved in this tick, exactly, and what happened.

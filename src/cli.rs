@@ -54,6 +54,8 @@ pub(crate) enum Command {
     Scenarios(ScenariosArgs),
     /// List the runs that are alive on this machine
     List(ListArgs),
+    /// Tell a live run that something has changed: a goal, an object, a wall, a robot
+    Tell(TellArgs),
     /// Measure how fast this machine runs a scenario
     Bench(BenchArgs),
     /// Role: the process that owns the state of all bodies
@@ -257,6 +259,80 @@ pub(crate) struct ListArgs {
     /// Print a JSON array
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = format!("\
+The change is made whole, from one tick on, or not at all; the answer names the tick or says why
+not. Robots drive what is granted to them, then go on by a new plan. Lengths are metres, objects
+and robots are counted from 0.
+
+Examples:
+  rearrange tell goal 2 4.0 1.5
+  rearrange tell goal 0 4.0 1.5 1 none      two at once; object 1 is to go nowhere
+  rearrange tell --run night close 3.0 0.0 3.2 1.4
+  rearrange tell lose 1
+
+{STATUSES}"))]
+pub(crate) struct TellArgs {
+    /// Name or id of the run, as `rearrange list` shows it; `latest` is the one started last
+    #[arg(long, value_name = "RUN", default_value = node::domain::LATEST, global = true)]
+    pub(crate) run: String,
+    #[command(subcommand)]
+    pub(crate) what: What,
+}
+
+/// What a run can be told.
+#[derive(Debug, Subcommand)]
+pub(crate) enum What {
+    /// Objects are to go elsewhere: OBJECT X Y, or OBJECT none; several are changed together
+    Goal {
+        /// Number of the object, and where its centre shall be
+        #[arg(value_name = "OBJECT X Y", num_args = 2.., required = true, allow_negative_numbers = true)]
+        goals: Vec<String>,
+    },
+    /// Somebody else has moved an object that no robot holds
+    Move {
+        /// Number of the object
+        object: usize,
+        /// Where its centre is now
+        #[arg(value_names = ["X", "Y"], num_args = 2, required = true, allow_negative_numbers = true, value_parser = number(-1e5, 1e5))]
+        to: Vec<f64>,
+    },
+    /// There is one more object; it gets the next number
+    AddObject {
+        /// Where its centre is
+        #[arg(value_names = ["X", "Y"], num_args = 2, required = true, allow_negative_numbers = true, value_parser = number(-1e5, 1e5))]
+        at: Vec<f64>,
+        /// Where it is to go [default: nowhere]
+        #[arg(long, value_names = ["X", "Y"], num_args = 2, allow_negative_numbers = true, value_parser = number(-1e5, 1e5))]
+        goal: Option<Vec<f64>>,
+        /// It has the shape and the grasp of this object
+        #[arg(long, value_name = "OBJECT", default_value_t = 0)]
+        like: usize,
+    },
+    /// A wall stands where there was none: a box from its lower left to its upper right corner
+    Close {
+        /// The two corners
+        #[arg(value_names = ["X0", "Y0", "X1", "Y1"], num_args = 4, required = true, allow_negative_numbers = true, value_parser = number(-1e5, 1e5))]
+        corners: Vec<f64>,
+    },
+    /// A wall is gone
+    Open {
+        /// A point that this wall alone covers
+        #[arg(value_names = ["X", "Y"], num_args = 2, required = true, allow_negative_numbers = true, value_parser = number(-1e5, 1e5))]
+        at: Vec<f64>,
+    },
+    /// A robot takes part no more: it stays where it is, with what it holds, as an obstacle
+    Lose {
+        /// Number of the robot
+        robot: u32,
+    },
+    /// A robot that was lost takes part again
+    Back {
+        /// Number of the robot
+        robot: u32,
+    },
 }
 
 #[derive(Debug, Args)]

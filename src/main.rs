@@ -1,5 +1,6 @@
 //! The `rearrange` binary: parses the command line, does it, ends with a status.
 
+mod changes;
 mod cli;
 mod commands;
 mod drivers;

@@ -134,6 +134,7 @@ pub(crate) struct Counts {
     pub(crate) invalid_requests: u64,
     /// Schedules that the world refused whole.
     pub(crate) schedules_refused: u64,
+    pub(crate) scene_changes: u64,
     pub(crate) deadline_misses: u64,
     pub(crate) restarts: u64,
     pub(crate) lost_commands: u64,

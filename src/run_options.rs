@@ -44,6 +44,10 @@ pub(crate) struct RunArgs {
     #[command(flatten)]
     pub(crate) process: ProcessArgs,
 
+    /// Tell the run of changes at stated times, from this file (TOML; docs/changes.md)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) changes: Option<PathBuf>,
+
     /// Print the result as one JSON object on stdout
     #[arg(long, help_heading = "Output")]
     pub(crate) json: bool,
@@ -220,7 +224,7 @@ impl RunArgs {
     }
 
     /// World time of a tick, ns.
-    fn tick_ns(&self) -> u64 {
+    pub(crate) fn tick_ns(&self) -> u64 {
         let lockstep = self
             .time
             .tick

@@ -190,6 +190,7 @@ fn run_by_hand(
                     role: RoleKind::Robot.code(),
                     index: id as u32,
                     incarnation: command.incarnation,
+                    ..ControlRequest::default()
                 });
             } else if answers(id, tick) {
                 let in_force = snapshot.header.schedule_version;
@@ -224,6 +225,7 @@ fn run_by_hand(
             table: None,
             schedule: schedule.map(|s| (s.version, Checked::new(s, counts).ok())),
             control: &control,
+            change: None,
         };
         world.step(scene, input, &mut motion);
         world.snapshot_into(&mut snapshot);

@@ -34,6 +34,8 @@ pub const MAX_ROOT_AND_PREFIX: usize = 60;
 const RUN_FILE: &str = "run.json";
 const SCENARIO_FILE: &str = "scenario.toml";
 const LOCK_FILE: &str = "lock";
+/// What stands for the run started last.
+pub const LATEST: &str = "latest";
 
 /// Why a run's place could not be made or found.
 #[derive(Debug, thiserror::Error)]
@@ -65,6 +67,17 @@ pub enum DomainError {
          not \"latest\""
     )]
     BadName(String),
+    /// No run is live.
+    #[error("no run is live; start one with `rearrange run`")]
+    NoneLive,
+    /// No live run has this name.
+    #[error("no live run has the name or id {name:?}; live are: {}", or_none(live))]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// Names of those that are live.
+        live: Vec<String>,
+    },
     /// The system refused.
     #[error("could not use {path}: {source}")]
     File {
@@ -163,21 +176,8 @@ impl RunDirectory {
         self.put(RUN_FILE, text.as_bytes())
     }
 
-    /// Writes a private file, renamed into place.
     fn put(&self, name: &str, bytes: &[u8]) -> Result<(), DomainError> {
-        let path = self.path.join(name);
-        let draft = self.path.join(format!("{name}.draft"));
-        let write = || {
-            let mut file = OpenOptions::new()
-                .write(true)
-                .create(true)
-                .truncate(true)
-                .mode(0o600)
-                .open(&draft)?;
-            file.write_all(bytes)?;
-            fs::rename(&draft, &path)
-        };
-        write().map_err(|e| file_error(&path, e))
+        put(&self.path.join(name), bytes)
     }
 
     /// Removes what the run has left in shared memory. Only once all its processes are dead.
@@ -243,9 +243,53 @@ pub fn list() -> Result<Vec<LiveRun>, DomainError> {
     Ok(live.into_iter().map(LiveRun::from).collect())
 }
 
+/// Writes a private file, renamed into place.
+fn put(path: &Path, bytes: &[u8]) -> Result<(), DomainError> {
+    let draft = path.with_extension("draft");
+    let write = || {
+        let mut file = OpenOptions::new()
+            .write(true)
+            .create(true)
+            .truncate(true)
+            .mode(0o600)
+            .open(&draft)?;
+        file.write_all(bytes)?;
+        fs::rename(&draft, path)
+    };
+    write().map_err(|e| file_error(path, e))
+}
+
+/// The live run of this id or name, or the one started last for "latest".
+///
+/// # Errors
+/// There is none, or the directory of runs cannot be used.
+pub(crate) fn find(name: &str) -> Result<RunFile, DomainError> {
+    let mut live = Runs::open(runs::default_path())?.live()?;
+    let found = match name {
+        LATEST => (0..live.len()).max_by_key(|&run| runs::began(&live[run].root)),
+        name => (live.iter()).position(|run| run.id == name || run.name == name),
+    };
+    match found {
+        Some(run) => Ok(live.swap_remove(run)),
+        None if name == LATEST => Err(DomainError::NoneLive),
+        None => Err(DomainError::Unknown {
+            name: name.to_owned(),
+            live: live.into_iter().map(|run| run.name).collect(),
+        }),
+    }
+}
+
 fn file_error(path: &Path, source: io::Error) -> DomainError {
     DomainError::File {
         path: path.to_owned(),
         source,
+    }
+}
+
+fn or_none(names: &[String]) -> String {
+    if names.is_empty() {
+        "none".to_owned()
+    } else {
+        names.join(", ")
     }
 }

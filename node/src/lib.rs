@@ -18,6 +18,7 @@ pub mod report;
 pub mod roles;
 pub mod shared_memory;
 pub mod supervisor;
+mod tell;
 mod ticker;
 mod topics;
 mod wait;
@@ -25,7 +26,10 @@ mod wakes;
 mod wire;
 
 pub use histograms::{Latencies, LatencySummary, Timed};
-pub use options::{Clock, Delay, Launcher, OptionError, Role, RunOptions, RunPlan, Wait};
+pub use options::{
+    Clock, Delay, Launcher, OptionError, Role, RunOptions, RunPlan, Told, ToldAt, Wait,
+};
 pub use realtime::pin_thread;
 pub use report::{RoleReport, RunReport, WorldReport};
 pub use supervisor::{Observer, RunError, Signals};
+pub use tell::{Answered, TellError, tell};

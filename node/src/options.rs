@@ -12,7 +12,7 @@ mod tests;
 
 use std::path::PathBuf;
 
-use scene::Settings;
+use scene::{Change, Settings};
 use serde::{Deserialize, Serialize};
 use shm_types::Counts;
 
@@ -69,6 +69,35 @@ pub struct Delay {
     pub ticks: u64,
 }
 
+/// Something that a run is told.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Told {
+    /// The scene changes, all of it together.
+    Change(Vec<Change>),
+    /// A robot takes part no more.
+    Lose(u32),
+    /// It takes part again.
+    Back(u32),
+}
+
+/// What a run is told in a stated tick: the snapshot after it shows it first.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ToldAt {
+    /// The tick.
+    pub tick: u64,
+    /// What it is told.
+    pub what: Told,
+}
+
+impl ToldAt {
+    /// That it could not be made, as one sentence.
+    #[must_use]
+    pub fn not_made(&self, why: &str) -> String {
+        format!("what tick {} was to bring was not made: {why}", self.tick)
+    }
+}
+
 /// What every process of a run reads: half of `run.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunOptions {
@@ -91,6 +120,8 @@ pub struct RunOptions {
     pub warm_up_ticks: u64,
     /// Participants made slow on purpose.
     pub delays: Vec<Delay>,
+    /// What the run is told on its way.
+    pub changes: Vec<ToldAt>,
     /// Where the recorder writes; if none, in the run's directory, which goes with the report.
     pub trace: Option<PathBuf>,
     /// Where the world writes the state hash of each tick, one line each; nowhere if none.
@@ -111,6 +142,7 @@ impl RunOptions {
             state_rate_hz: DEFAULT_STATE_RATE_HZ,
             warm_up_ticks: 0,
             delays: Vec::new(),
+            changes: Vec::new(),
             trace: None,
             hashes: None,
         }

@@ -132,6 +132,10 @@ pub struct WorldReport {
     pub invalid_requests: u64,
     /// Schedules refused whole.
     pub schedules_refused: u64,
+    /// The newest of them, in words.
+    pub refused_schedule: Option<String>,
+    /// How often the scene was changed.
+    pub scene_changes: u64,
     /// Claims on one task by two robots in one tick.
     pub selection_conflicts: u64,
     /// Broken invariants.

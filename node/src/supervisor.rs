@@ -170,7 +170,7 @@ impl<'p> Run<'p> {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         plan.options.check(counts, cores)?;
         let topics = Topics::of(counts, plan.options.settings.method, plan.options.monitors);
-        let participants = u64::from(counts.robots + plan.options.monitors) + 4;
+        let participants = u64::from(counts.robots + plan.options.monitors) + 5;
         shared_memory::reserve(topics.bytes(), participants)?;
         let signals = Signals::watch().map_err(RunError::Signals)?;
         let mut options = plan.options.clone();
@@ -300,6 +300,7 @@ impl<'p> Run<'p> {
             role: role.code(),
             index,
             incarnation: FIRST_INCARNATION,
+            ..ControlRequest::default()
         };
         self.watch.ask(request)
     }

@@ -29,8 +29,8 @@ pub(crate) const MOTION_BUFFER: usize = 256;
 pub(crate) const MOTION_WINDOW: u64 = 192;
 /// Senders of control requests: the supervisor, and one other program at a time.
 const CONTROL_CLIENTS: usize = 2;
-/// Participants that are no robots, and the supervisor.
-const OTHER_NODES: usize = 4;
+/// Participants that are no robots, the supervisor, and one program that tells of a change.
+const OTHER_NODES: usize = 5;
 
 const _: () = assert!(MOTION_WINDOW < MOTION_BUFFER as u64);
 
@@ -101,7 +101,7 @@ impl Topics {
             control: calls("control", all, CONTROL_CLIENTS),
             //                          name                nodes sleepers    wakers
             wake_participants: wakes("wake/participants", all, robots + 1, 1),
-            wake_world: wakes("wake/world", all, 1, robots + 3),
+            wake_world: wakes("wake/world", all, 1, robots + 4),
         }
     }
 

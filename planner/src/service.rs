@@ -58,6 +58,7 @@ enum Job {
 
 /// The planner service.
 pub struct Planner {
+    settings: Settings,
     method: Method,
     tasks: usize,
     hard: HardConstraints,
@@ -69,12 +70,16 @@ pub struct Planner {
     /// Answers of this step.
     answers: Vec<HardAnswer>,
     table: Box<ConstraintTable>,
+    /// The table has to be published anew, whatever is found.
+    is_stale: bool,
     /// Constraints it has no room for.
     dropped: u32,
     /// The schedule of a method that plans ahead, once there is one.
     schedule: Option<Box<Schedule>>,
     /// Its version when it was published last; 0 if it never was.
     schedule_version: u32,
+    /// Version of the scene that all of this is about.
+    scene_version: u32,
     /// Who makes it.
     anytime: Option<Anytime>,
     /// How planning ahead stands.
@@ -92,6 +97,7 @@ impl Planner {
         let mut table = zeroed::<ConstraintTable>();
         table.complete_for_events = u64::MAX;
         Self {
+            settings: settings.clone(),
             method: settings.method,
             tasks,
             hard: HardConstraints::new(scene, &settings),
@@ -101,9 +107,11 @@ impl Planner {
             // The old answer again, that of a job for the robot's last life, and the new one.
             answers: Vec::with_capacity(3 * robots),
             table,
+            is_stale: false,
             dropped: 0,
             schedule: settings.method.plans_ahead().then(zeroed),
             schedule_version: 0,
+            scene_version: 0,
             anytime: (settings.method.plans_ahead()).then(|| Anytime::new(&settings)),
             standing: Standing::Idle(Verdict::Open),
             counters: Counters::default(),
@@ -126,6 +134,9 @@ impl Planner {
     /// One step: takes in the requests, then works for at most `units`.
     pub fn step(&mut self, scene: &Scene, input: PlannerInput, units: u64) -> PlannerOutput<'_> {
         let header = &input.snapshot.header;
+        if header.scene_version != self.scene_version {
+            self.enter(scene, input.snapshot);
+        }
         // A planner that was started again goes on where the one before it stopped counting.
         self.table.version = self.table.version.max(header.constraints_version);
         self.answers.clear();
@@ -135,7 +146,8 @@ impl Planner {
         let repeated = self.answers.len();
         let mut budget = Budget::new(units);
         let plans_ahead = self.method.plans_ahead();
-        let publish = !plans_ahead && self.work(scene, input.snapshot, &mut budget);
+        let found = !plans_ahead && self.work(scene, input.snapshot, &mut budget);
+        let publish = std::mem::take(&mut self.is_stale) || found;
         let reschedule = plans_ahead && self.plan_ahead(scene, input.snapshot, &mut budget);
         self.counters.units += budget.spent();
         if publish {
@@ -208,6 +220,29 @@ impl Planner {
         self.schedule_version = schedule.version;
         schedule.hash_into(&mut self.journal);
         true
+    }
+
+    /// Everything is about another version of the scene from here on. What was found of the one
+    /// before may not be true any more, so the next table is without it, and plans are made anew.
+    fn enter(&mut self, scene: &Scene, snapshot: Checked<WorldSnapshot>) {
+        let settings = self.settings.clone();
+        *self = Self {
+            answered: std::mem::take(&mut self.answered),
+            table: std::mem::replace(&mut self.table, zeroed()),
+            schedule: self.schedule.take(),
+            schedule_version: self.schedule_version,
+            scene_version: snapshot.header.scene_version,
+            anytime: self.anytime.take(),
+            standing: self.standing,
+            counters: self.counters,
+            journal: self.journal.clone(),
+            is_stale: !self.method.plans_ahead(),
+            ..Self::new(scene, settings)
+        };
+        self.table.complete_for_events = u64::MAX;
+        if let Some(anytime) = &mut self.anytime {
+            anytime.replan(snapshot);
+        }
     }
 
     /// Takes a request in: into the queue, unless it is there, was answered, or makes no sense.

@@ -34,6 +34,8 @@ pub(crate) struct Follower {
     last: Option<(u32, Action)>,
     /// When that was asked for.
     asked_ns: u64,
+    /// Version of the scene; in another one what was asked for before is void.
+    scene_version: u32,
 }
 
 /// A grip that is due.
@@ -53,6 +55,7 @@ impl Follower {
             started: false,
             last: None,
             asked_ns: 0,
+            scene_version: 0,
         }
     }
 
@@ -61,6 +64,10 @@ impl Follower {
         if !self.started {
             self.started = true;
             intent.take_up(now);
+        }
+        let version = now.snapshot.header.scene_version;
+        if self.scene_version != version {
+            (self.scene_version, self.last) = (version, None);
         }
         let Some(schedule) = now.schedule else {
             intent.claim = select::claim(now, now.holding());
@@ -130,6 +137,7 @@ impl Follower {
     /// Adds what it remembers, in a fixed order.
     pub(crate) fn hash_into(&self, hash: &mut StateHash) {
         hash.add(&[u64::from(self.started), self.asked_ns]);
+        hash.add(&self.scene_version);
         if let Some((number, action)) = &self.last {
             hash.add(number);
             hash.add(action);

@@ -5,8 +5,8 @@
 
 use scene::{Budget, Scene, Settings};
 use shm_types::{
-    Checked, Command, ConstraintTable, Counters, HardAnswer, HardRequest, Phase as WirePhase,
-    Schedule, StateHash, WorldSnapshot,
+    Checked, Command, ConstraintTable, Counters, Failure, HardAnswer, HardRequest,
+    Phase as WirePhase, Schedule, StateHash, WorldSnapshot,
 };
 
 use crate::account::{Doing, Thinking};
@@ -76,6 +76,28 @@ impl Robot {
             intent: Intent::new(),
             hash: StateHash::new(),
         }
+    }
+
+    /// Goes on in another version of the scene. One that selects forgets what it was about: the
+    /// world has taken its path and its claim back, and it looks again.
+    pub fn enter(&mut self, scene: &Scene) {
+        let Mind::Selects(selector) = &mut self.mind else {
+            return;
+        };
+        let thinking = &selector.thinking;
+        let (settings, counters) = (thinking.settings.clone(), thinking.counters);
+        **selector = Selector {
+            phase: Phase::Starting,
+            thinking: Thinking {
+                counters,
+                ..Thinking::new(scene, settings)
+            },
+        };
+        self.intent.failure = Failure {
+            id: self.intent.failure.id,
+            ..Failure::default()
+        };
+        self.intent.selected_epoch = 0;
     }
 
     /// Answers one snapshot, within `units` of work. Writes the whole command, and returns what

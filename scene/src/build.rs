@@ -91,7 +91,8 @@ pub(crate) fn default_grasp(robot: &ShapeDraft, object: &ShapeDraft) -> [f64; 2]
     }
 }
 
-fn wall_shape(wall: &WallDraft) -> Result<(Shape, Vec2), ShapeError> {
+/// A wall around its own origin, and where that is.
+pub(crate) fn wall_shape(wall: &WallDraft) -> Result<(Shape, Vec2), ShapeError> {
     match wall {
         WallDraft::Box([x0, y0, x1, y1]) => rectangle(Vec2::new(*x0, *y0), Vec2::new(*x1, *y1)),
         WallDraft::Polygon(points) => {

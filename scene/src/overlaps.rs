@@ -9,6 +9,7 @@ use crate::draft::Draft;
 use crate::geometry::{CONTACT_M, Vec2, overlap};
 use crate::problem::{Key, Problem};
 use crate::shape::Shape;
+use crate::validate::Starts;
 
 /// Overlaps beyond this many are only counted: they share one cause.
 const MAX_REPORTED: usize = 50;
@@ -39,7 +40,12 @@ fn meet(a: &Shape, at: Vec2, b: &Shape, bt: Vec2) -> bool {
 }
 
 /// Finds every overlap of a draft whose numbers and shapes are sound.
-pub(crate) fn check_overlaps(draft: &Draft, sound: &Sound, problems: &mut Vec<Problem>) {
+pub(crate) fn check_overlaps(
+    draft: &Draft,
+    sound: &Sound,
+    which: Starts,
+    problems: &mut Vec<Problem>,
+) {
     let robot = &sound.robot.shape;
     let grown = robot.grown(sound.robot.clearance_m);
     let homes: Vec<_> = sound
@@ -56,11 +62,13 @@ pub(crate) fn check_overlaps(draft: &Draft, sound: &Sound, problems: &mut Vec<Pr
     let mut goals = Vec::new();
     for (i, object) in sound.objects.iter().enumerate() {
         let shape = &object.shape;
-        starts.push(Resting {
-            shape,
-            at: object.start,
-            key: Key::Object(i, "start"),
-        });
+        if which == Starts::Checked {
+            starts.push(Resting {
+                shape,
+                at: object.start,
+                key: Key::Object(i, "start"),
+            });
+        }
         goals.extend(object.goal.map(|at| Resting {
             shape,
             at,

@@ -8,8 +8,9 @@ use std::sync::Arc;
 
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceSpan};
 
+use crate::draft::Draft;
 use crate::file::{Range, ScenarioFile};
-use crate::problem::Problem;
+use crate::problem::{Problem, Problems};
 use crate::scene::Scene;
 
 /// One problem with its place in the text.
@@ -65,13 +66,30 @@ impl ScenarioError {
 /// # Errors
 /// Everything that is wrong with it, each with its line.
 pub fn parse(text: &str, source_name: &str) -> Result<Scene, ScenarioError> {
+    parse_with(text, source_name, Scene::new)
+}
+
+/// Reads a version of a scenario that a change during a run has led to: its starts are history,
+/// and not checked.
+///
+/// # Errors
+/// As those of [`parse`].
+pub fn parse_version(text: &str, source_name: &str) -> Result<Scene, ScenarioError> {
+    parse_with(text, source_name, Scene::version)
+}
+
+fn parse_with(
+    text: &str,
+    source_name: &str,
+    make: fn(Draft) -> Result<Scene, Problems>,
+) -> Result<Scene, ScenarioError> {
     let report = Report {
         file: source_name,
         text: Arc::from(text),
     };
     let file: ScenarioFile = toml::from_str(text).map_err(|error| report.malformed(&error))?;
     file.draft()
-        .and_then(|draft| Scene::new(draft).map_err(|problems| problems.0))
+        .and_then(|draft| make(draft).map_err(|problems| problems.0))
         .map_err(|problems| report.problems(&file, &problems))
 }
 

@@ -16,7 +16,7 @@ use crate::lattice::{Lattice, LatticeInput};
 use crate::problem::Problems;
 use crate::raster::Raster;
 use crate::shape::Shape;
-use crate::validate::validate;
+use crate::validate::{Starts, validate};
 
 /// The robots' common properties.
 #[derive(Clone, Debug)]
@@ -85,6 +85,18 @@ impl Scene {
     /// # Errors
     /// Everything that is wrong with it.
     pub fn new(draft: Draft) -> Result<Self, Problems> {
+        Self::make(draft, Starts::Checked)
+    }
+
+    /// As [`Self::new`], for a version of a scene under way: where objects start is history.
+    ///
+    /// # Errors
+    /// Everything else that is wrong with it.
+    pub fn version(draft: Draft) -> Result<Self, Problems> {
+        Self::make(draft, Starts::History)
+    }
+
+    fn make(draft: Draft, starts: Starts) -> Result<Self, Problems> {
         let Sound {
             bounds,
             walls,
@@ -92,9 +104,16 @@ impl Scene {
             objects,
             homes,
             classes,
-        } = validate(&draft)?;
+        } = validate(&draft, starts)?;
         let inside = &walls[..draft.walls.len()];
-        let lattice = choose_lattice(&draft, bounds, inside, &robot, &objects, &homes, &classes);
+        let mut lattice = choose_lattice(
+            &draft, starts, bounds, inside, &robot, &objects, &homes, &classes,
+        );
+        if starts == Starts::History {
+            // Where things happen to stand makes the lattice no coarser, but less than exact.
+            let on_it = |object: &ObjectSpec| lattice.cell(object.start + object.grasp).is_some();
+            lattice.exact &= objects.iter().all(on_it);
+        }
         let walls_only = classes
             .iter()
             .map(|body| Raster::of_walls(&lattice, body, &walls))
@@ -208,8 +227,10 @@ impl Scene {
     }
 }
 
+#[expect(clippy::too_many_arguments, reason = "all that a lattice has to fit")]
 fn choose_lattice(
     draft: &Draft,
+    starts: Starts,
     bounds: (Vec2, Vec2),
     walls: &[(Shape, Vec2)],
     robot: &RobotSpec,
@@ -220,7 +241,8 @@ fn choose_lattice(
     let mut resting = Vec::new();
     let mut stops = homes.to_vec();
     for object in objects {
-        for at in [Some(object.start), object.goal].into_iter().flatten() {
+        let start = (starts == Starts::Checked).then_some(object.start);
+        for at in [start, object.goal].into_iter().flatten() {
             resting.push((object.shape.clone(), at));
             stops.push(at + object.grasp);
         }

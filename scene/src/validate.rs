@@ -24,11 +24,21 @@ pub const MAX_GRIP_S: f64 = 86_400.0;
 pub const MAX_CLEARANCE_M: f64 = 10.0;
 /// Longest name, bytes.
 pub const MAX_NAME_BYTES: usize = 128;
+
+/// What the starts of objects are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Starts {
+    /// Where they stand: they must be free.
+    Checked,
+    /// Where they once stood.
+    History,
+}
+
 /// Checks a draft.
 ///
 /// # Errors
 /// Everything that is wrong with it.
-pub(crate) fn validate(draft: &Draft) -> Result<Sound, Problems> {
+pub(crate) fn validate(draft: &Draft, starts: Starts) -> Result<Sound, Problems> {
     let mut problems = Vec::new();
     check_counts(draft, &mut problems);
     check_numbers(draft, &mut problems);
@@ -38,7 +48,7 @@ pub(crate) fn validate(draft: &Draft) -> Result<Sound, Problems> {
         && let Some(sound) = &sound
     {
         check_resolution(draft, sound, &mut problems);
-        check_overlaps(draft, sound, &mut problems);
+        check_overlaps(draft, sound, starts, &mut problems);
     }
     match sound {
         Some(sound) if problems.is_empty() => Ok(sound),

@@ -18,12 +18,16 @@ pub const MAX_WAITS: usize = 16_384;
 pub const MAX_MOTIONS: usize = MAX_ROBOTS * 2 * 4;
 /// Most events in one tick.
 pub const MAX_EVENTS: usize = 2_048;
+/// Most changes of the scene that one request makes together.
+pub const MAX_CHANGES: usize = 16;
+/// Longest answer in words to a request of control, bytes.
+pub const MAX_ANSWER_BYTES: usize = 488;
 /// Words of a bit set over robots.
 pub const ROBOT_WORDS: usize = MAX_ROBOTS / 64;
 
 /// First word of every snapshot: "rearrang" in ASCII, little endian.
 pub const MAGIC: u64 = u64::from_le_bytes(*b"rearrang");
 /// Layout of the messages. Raised whenever one changes.
-pub const LAYOUT_VERSION: u32 = 2;
+pub const LAYOUT_VERSION: u32 = 3;
 
 const _: () = assert!(MAX_ROBOTS.is_multiple_of(64));

@@ -6,13 +6,14 @@
 use std::ops::Deref;
 
 use crate::capacity::{
-    LAYOUT_VERSION, MAGIC, MAX_ACTIONS, MAX_CONSTRAINTS, MAX_EVENTS, MAX_MOTIONS, MAX_OBJECTS,
-    MAX_PATH_POINTS, MAX_ROBOTS, MAX_WAITS,
+    LAYOUT_VERSION, MAGIC, MAX_ACTIONS, MAX_CHANGES, MAX_CONSTRAINTS, MAX_EVENTS, MAX_MOTIONS,
+    MAX_OBJECTS, MAX_PATH_POINTS, MAX_ROBOTS, MAX_WAITS,
 };
 use crate::{
-    Activity, BodyKind, Command, ConstraintKind, ConstraintTable, ControlKind, ControlRequest,
-    EventKind, FailureCause, Grip, HardAnswer, HardRequest, MotionBatch, NONE, Outcome, Phase,
-    PlannerReport, Point, RecorderReport, RoleKind, Schedule, TaskStatus, Verdict, WorldSnapshot,
+    Activity, BodyKind, ChangeKind, Command, ConstraintKind, ConstraintTable, ControlKind,
+    ControlRequest, EventKind, FailureCause, Grip, HardAnswer, HardRequest, MotionBatch, NONE,
+    Outcome, Phase, PlannerReport, Point, RecorderReport, RoleKind, Schedule, TaskStatus, Verdict,
+    WorldSnapshot,
 };
 
 /// Why a message was refused.
@@ -196,6 +197,18 @@ fn flag(what: &'static str, code: u32) -> Result<(), Invalid> {
     }
 }
 
+impl WorldSnapshot {
+    /// How many robots and objects it says there are: a change of the scene adds some. Whoever
+    /// does not know the scene checks it against these, which compares only its values.
+    #[must_use]
+    pub const fn own_counts(&self) -> Counts {
+        Counts {
+            robots: self.header.robot_count,
+            objects: self.header.object_count,
+        }
+    }
+}
+
 impl Validate for WorldSnapshot {
     fn validate(&self, counts: Counts) -> Result<(), Invalid> {
         let header = &self.header;
@@ -373,6 +386,18 @@ impl Validate for ControlRequest {
         ControlKind::decode(self.kind)?;
         if RoleKind::decode(self.role)? == RoleKind::Robot {
             id("robot", self.index, counts.robots)?;
+        }
+        count("changes", self.change_count, MAX_CHANGES)?;
+        for change in self.changes() {
+            flag("has_goal", change.has_goal)?;
+            finite("a place of a change", change.at)?;
+            finite("a place of a change", change.to)?;
+            match ChangeKind::decode(change.kind)? {
+                ChangeKind::Goal | ChangeKind::Move | ChangeKind::Add => {
+                    id("object", change.object, counts.objects)?;
+                }
+                ChangeKind::Close | ChangeKind::Open => {}
+            }
         }
         Ok(())
     }

@@ -29,7 +29,7 @@ mod versioned;
 
 pub use checked::{Checked, Counts, Invalid, Validate};
 pub use command::{Claim, Command, Counters, Failure, PathRequest};
-pub use control::{ControlKind, ControlReply, ControlRequest, RoleKind};
+pub use control::{ChangeKind, ControlKind, ControlReply, ControlRequest, RoleKind, SceneChange};
 pub use hash::StateHash;
 pub use id::{NONE, index};
 pub use motion::{BodyKind, EventKind, EventRecord, MotionBatch, MotionRecord, RecorderReport};
@@ -37,7 +37,7 @@ pub use planner::{
     Constraint, ConstraintKind, ConstraintTable, HardAnswer, HardRequest, PlannerReport, Verdict,
 };
 pub use point::Point;
-pub use schedule::{Action, RobotSchedule, Schedule, Wait};
+pub use schedule::{Action, Refusal, RobotSchedule, Schedule, Wait};
 pub use snapshot::{
     Activity, FailureCause, Grip, ObjectState, Outcome, Phase, RobotState, SnapshotHeader,
     TaskStatus, WorldSnapshot,

@@ -57,6 +57,16 @@ tag! {
         /// Two robots or bodies broke an invariant: `robot`, `task`, `other` say who, `value`
         /// which (the world's numbering).
         Violated = 16,
+        /// The scenario has changed; `other` is its version, `value` its hash. What it says holds
+        /// from the beginning of this tick on.
+        Changed = 17,
+        /// Somebody has moved `task`'s object by hand, to its start in the version of the scenario
+        /// just announced.
+        Moved = 18,
+        /// A schedule was refused: `value` is its version and, from bit 32 on, how many actions
+        /// were granted to `robot`, the one it does not fit; `other` is the code of the
+        /// [`crate::Refusal`].
+        ScheduleRefused = 19,
     }
 }
 

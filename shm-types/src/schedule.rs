@@ -10,7 +10,20 @@
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 use crate::capacity::{MAX_ACTIONS, MAX_ROBOTS, MAX_WAITS};
+use crate::id::tag;
 use crate::{Point, StateHash};
+
+tag! {
+    /// Why the world refuses a schedule.
+    pub enum Refusal {
+        /// It is no legal message: a count, an id or a number is out of range.
+        Illegal = 0,
+        /// A robot's actions begin past what is granted to it, or end before.
+        Gap = 1,
+        /// What is granted to a robot leads elsewhere than it says.
+        Elsewhere = 2,
+    }
+}
 
 /// A straight piece of way and what the grip does at its end.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, Immutable, KnownLayout)]

@@ -114,7 +114,7 @@ pub struct SnapshotHeader {
     pub layout_version: u32,
     /// Raised each time the world process starts again.
     pub generation: u32,
-    /// Hash of the canonical scenario all processes start from.
+    /// Hash of the canonical scenario in force: the one all processes start from, or a later version.
     pub scenario_hash: u64,
     /// Identity of the run.
     pub run_id: u64,
@@ -153,6 +153,10 @@ pub struct SnapshotHeader {
     pub outcome: u32,
     /// 1 while all motion is held.
     pub held: u32,
+    /// Version of the scenario in force: 0 at the start, one more with each change.
+    pub scene_version: u32,
+    /// Always 0.
+    pub reserved: u32,
 }
 
 /// One robot.

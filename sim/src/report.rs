@@ -6,7 +6,7 @@
 use std::fmt;
 
 use shm_types::{Counters, Outcome, Verdict};
-use world::{ActivityTimes, WorldCounters};
+use world::{ActivityTimes, Refused, WorldCounters};
 
 /// One robot's account.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +34,10 @@ pub struct SimReport {
     pub state_hash: u64,
     /// What the world counted.
     pub world: WorldCounters,
+    /// The newest schedule that it refused.
+    pub refused: Option<Refused>,
+    /// How often the scene was changed.
+    pub scene_version: u32,
     /// The robots.
     pub robots: Vec<RobotReport>,
     /// Work done by the planner service.

@@ -3,18 +3,19 @@
 //! Responsible for: stepping everyone in the fixed order, staging messages from tick to tick.
 //! Not responsible for: anything a machine decides.
 
+use std::borrow::Cow;
 use std::ops::ControlFlow;
 
 use planner::{Planner, PlannerInput};
 use robot::{Robot, RobotInput};
-use scene::{Scene, Settings};
+use scene::{Change, Scene, Settings};
 use shm_types::capacity::MAX_ROBOTS;
 use shm_types::{
     Checked, Command, ConstraintTable, ControlKind, ControlRequest, Counts, HardAnswer,
     HardRequest, Invalid, MotionBatch, Outcome, PlannerReport, RoleKind, Schedule, Validate,
     WorldSnapshot, zeroed,
 };
-use world::{FIRST_INCARNATION, World, WorldInput};
+use world::{FIRST_INCARNATION, Next, NotMade, World, WorldInput};
 
 use crate::report::{Cycle, RobotReport, SimReport};
 use crate::tables::Tables;
@@ -59,7 +60,7 @@ pub enum Participant {
 
 /// World, planner and robots of one run. After construction a tick allocates nothing.
 pub struct Simulation<'s> {
-    scene: &'s Scene,
+    scene: Cow<'s, Scene>,
     settings: Settings,
     world: World,
     planner: Planner,
@@ -85,6 +86,8 @@ pub struct Simulation<'s> {
     /// What the world is told in the next step.
     control: Vec<ControlRequest>,
     control_id: u64,
+    /// The version of the scene that the next step brings into force.
+    next: Option<Next>,
 }
 
 impl<'s> Simulation<'s> {
@@ -96,7 +99,7 @@ impl<'s> Simulation<'s> {
         let mut snapshot = zeroed();
         world.snapshot_into(&mut snapshot);
         Self {
-            scene,
+            scene: Cow::Borrowed(scene),
             world,
             planner: Planner::new(scene, settings.clone()),
             robots: (0..robots)
@@ -117,6 +120,7 @@ impl<'s> Simulation<'s> {
             schedules: Tables::new(),
             control: Vec::with_capacity(robots + 1),
             control_id: 0,
+            next: None,
             settings: settings.clone(),
         }
     }
@@ -157,7 +161,7 @@ impl<'s> Simulation<'s> {
     /// When there is no such robot.
     pub fn restart_robot(&mut self, id: usize) {
         let incarnation = self.commands[id].incarnation + 1;
-        self.robots[id] = Robot::new(self.scene, self.settings.clone(), id, incarnation);
+        self.robots[id] = Robot::new(&self.scene, self.settings.clone(), id, incarnation);
         self.commands[id].incarnation = incarnation;
         self.answers[id] = None;
         self.staged.retain(|request| request.robot as usize != id);
@@ -176,7 +180,49 @@ impl<'s> Simulation<'s> {
     /// Puts another planner in the place of the one there is. It knows only what the snapshots
     /// say.
     pub fn restart_planner(&mut self) {
-        self.planner = Planner::new(self.scene, self.settings.clone());
+        self.planner = Planner::new(&self.scene, self.settings.clone());
+    }
+
+    /// Changes the scene, all of `changes` together: the tick whose snapshot is the first to show
+    /// it.
+    ///
+    /// # Errors
+    /// They cannot be made; nothing changes then.
+    pub fn change(&mut self, changes: &[Change]) -> Result<u64, NotMade> {
+        if self.next.is_some() {
+            return Err(NotMade::Busy);
+        }
+        self.next = Some(self.world.prepare(&self.scene, changes)?);
+        Ok(self.snapshot.header.tick + 1)
+    }
+
+    /// Lets a robot take part no more (`Down`), or again (`Up`): the tick whose snapshot is the
+    /// first to show it.
+    ///
+    /// # Errors
+    /// It cannot, in the world's words.
+    pub fn take_part(&mut self, kind: ControlKind, robot: usize) -> Result<u64, String> {
+        let request = ControlRequest {
+            kind: kind.code(),
+            role: RoleKind::Robot.code(),
+            index: robot as u32,
+            ..ControlRequest::default()
+        };
+        let tick = self.world.reply_to(&request).result()?;
+        self.tell(kind, RoleKind::Robot, robot, 0);
+        Ok(tick)
+    }
+
+    /// The scene in force.
+    #[must_use]
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// What the world knows beside its snapshot.
+    #[must_use]
+    pub const fn world(&self) -> &World {
+        &self.world
     }
 
     fn tell(&mut self, kind: ControlKind, role: RoleKind, index: usize, incarnation: u32) {
@@ -187,6 +233,7 @@ impl<'s> Simulation<'s> {
             role: role.code(),
             index: index as u32,
             incarnation,
+            ..ControlRequest::default()
         });
     }
 
@@ -242,7 +289,7 @@ impl<'s> Simulation<'s> {
                 schedule,
                 answer: self.answers[id],
             };
-            let asked = robot.step(self.scene, input, units, &mut self.commands[id]);
+            let asked = robot.step(&self.scene, input, units, &mut self.commands[id]);
             self.asked.extend(asked);
         }
     }
@@ -253,7 +300,7 @@ impl<'s> Simulation<'s> {
             snapshot: checked(&*self.snapshot, counts),
             requests: &self.staged,
         };
-        let output = self.planner.step(self.scene, input, units);
+        let output = self.planner.step(&self.scene, input, units);
         self.report = PlannerReport {
             incarnation: FIRST_INCARNATION,
             ..output.report
@@ -286,9 +333,16 @@ impl<'s> Simulation<'s> {
             table: self.tables.newest().and_then(|(_, table)| table),
             schedule: self.schedules.newest(),
             control: &self.control,
+            change: self.next.as_ref(),
         };
-        self.world.step(self.scene, input, &mut self.motion);
+        self.world.step(&self.scene, input, &mut self.motion);
         self.control.clear();
+        if let Some(next) = self.next.take() {
+            self.scene = Cow::Owned(next.scene);
+            for robot in &mut self.robots {
+                robot.enter(&self.scene);
+            }
+        }
         self.world.snapshot_into(&mut self.snapshot);
     }
 
@@ -311,13 +365,15 @@ impl<'s> Simulation<'s> {
             time_ns: self.snapshot.header.time_ns,
             state_hash: self.world.state_hash(),
             world: *self.world.counters(),
+            refused: self.world.refused_schedule(),
+            scene_version: self.world.scene_version(),
             robots: robots.collect(),
             planner: self.report.counters,
         }
     }
 
     fn reason(&self) -> Option<String> {
-        let reason = self.world.reason(self.scene)?;
+        let reason = self.world.reason(&self.scene)?;
         let cycle = self
             .robots
             .iter()

@@ -12,6 +12,7 @@ mod roles;
 mod run;
 mod scenarios;
 mod schema;
+mod tell;
 mod validate;
 mod view;
 
@@ -48,6 +49,7 @@ fn dispatch(command: Command) -> Outcome {
         Command::Validate(args) => validate::main(&args),
         Command::Scenarios(args) => scenarios::main(&args),
         Command::List(args) => list::main(&args),
+        Command::Tell(args) => tell::main(&args),
         Command::Bench(args) => bench::main(&args.workload),
         Command::World(args) => roles::main(node::Role::World, &args),
         Command::Planner(args) => roles::main(node::Role::Planner, &args),

@@ -4,7 +4,7 @@
 //! check, say what came out.
 //! Not responsible for: any of these steps.
 
-use node::RunOptions;
+use node::{RunOptions, ToldAt};
 use planner::{BoundLimits, Bounds, Proof};
 use scene::Scene;
 use shm_types::{Outcome as RunOutcome, Verdict};
@@ -16,7 +16,7 @@ use crate::progress::Progress;
 use crate::result::{Checker, Counts, Ending, Options, RunResult, Times, hex, seconds};
 use crate::run_options::{Driver, RunArgs};
 use crate::scenario::Loaded;
-use crate::{output, result, scenario, table};
+use crate::{changes, output, result, scenario, table};
 
 /// Violations quoted in the result.
 const MOST_QUOTED: usize = 10;
@@ -26,7 +26,10 @@ pub(crate) fn main(args: &RunArgs) -> Outcome {
     args.check()
         .map_err(|error| Failure::new(Exit::Usage, error))?;
     let Loaded { scene, seed } = scenario::load(&args.scenario, args.robots)?;
-    let options = options(args);
+    let options = RunOptions {
+        changes: changes_of(args)?,
+        ..options(args)
+    };
     let frame = RunResult {
         seed,
         ..frame(&scene, args, &options)
@@ -44,6 +47,15 @@ pub(crate) fn main(args: &RunArgs) -> Outcome {
         output::print(&table::render(&result, output::wants_colour()))?;
     }
     Ok(result.outcome.exit())
+}
+
+fn changes_of(args: &RunArgs) -> Result<Vec<ToldAt>, Failure> {
+    let file = args.changes.as_deref();
+    let told = file.map(|file| changes::read(file, args.tick_ns()));
+    let told = told.transpose();
+    Ok(told
+        .map_err(|error| Failure::new(Exit::BadInput, error))?
+        .unwrap_or_default())
 }
 
 fn options(args: &RunArgs) -> RunOptions {
@@ -128,10 +140,14 @@ fn infeasible(frame: RunResult, proof: &Proof) -> RunResult {
 fn complete(frame: RunResult, scene: &Scene, args: &RunArgs, finished: Finished) -> RunResult {
     let world = &finished.world;
     let times = Times::new(&world.activities, frame.options.run.settings.tick_ns);
+    let mut notes = finished.notes.clone();
+    notes.extend(world.refused_schedule.clone());
     let mean = times.as_ref().map(|times| times.mean);
     let checker = finished.check.as_ref().map(checker);
     let (outcome, reason) = ending(scene, &finished, checker.as_ref());
-    let bounds = Bounds::of(scene, BoundLimits::default());
+    // Another scene has other bounds.
+    let is_same = world.scene_changes == 0;
+    let bounds = Bounds::of(scene, BoundLimits::default()).filter(|_| is_same);
     RunResult {
         date: bench::machine::date_utc(),
         outcome,
@@ -157,7 +173,7 @@ fn complete(frame: RunResult, scene: &Scene, args: &RunArgs, finished: Finished)
         wall_s: finished.wall_s,
         oversubscribed: finished.oversubscribed,
         trace: args.trace.as_ref().map(|path| path.display().to_string()),
-        notes: finished.notes,
+        notes,
         ..frame
     }
 }
@@ -171,6 +187,7 @@ fn counts(finished: &Finished) -> Counts {
         grants_refused: world.grants_refused,
         invalid_requests: world.invalid_requests,
         schedules_refused: world.schedules_refused,
+        scene_changes: world.scene_changes,
         deadline_misses: finished.deadline_misses,
         restarts: finished.restarts,
         lost_commands: finished.lost_commands,
@@ -211,6 +228,8 @@ fn ending(
             (Ending::Failed, Some(reason))
         }
         RunOutcome::Solved => (Ending::Solved, reason),
+        // What is proved of the scenario is not proved of what it has become.
+        RunOutcome::Stuck if finished.world.scene_changes > 0 => (Ending::Stuck, reason),
         RunOutcome::Stuck => match Proof::search(scene).0 {
             Some(proof) => (Ending::Infeasible, Some(proof.to_string())),
             None if finished.world.verdict == Verdict::Exhausted.code() => {

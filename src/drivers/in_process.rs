@@ -9,9 +9,9 @@ use std::path::Path;
 use std::time::Instant;
 
 use node::report::{ActivityReport, WorkReport};
-use node::{Latencies, RunOptions, Timed, WorldReport};
+use node::{Latencies, RunOptions, Timed, Told, WorldReport};
 use scene::Scene;
-use shm_types::{Activity, Checked, Outcome, WorldSnapshot};
+use shm_types::{Activity, Checked, ControlKind, Outcome, WorldSnapshot};
 use sim::{SimReport, Simulation};
 use trace::{CheckReport, Ending, SceneRecord};
 
@@ -42,17 +42,24 @@ pub(crate) fn run(
     let mut latency = Latencies::new();
     let started = Instant::now();
     let (mut shown, mut before) = (started, started);
+    let mut notes = Vec::new();
     while simulation.outcome() == Outcome::Running {
         if interrupt.is_asked() {
             simulation.stop();
         }
+        let tick = simulation.snapshot().header.tick;
+        for told in options.changes.iter().filter(|told| told.tick == tick) {
+            if let Err(why) = tell(&mut simulation, &told.what) {
+                notes.push(told.not_made(&why));
+            }
+        }
         simulation.tick();
         let after = Instant::now();
         latency.record(Timed::Tick, (after - before).as_nanos() as u64);
-        files.add_tick(scene, &simulation, after)?;
+        files.add_tick(options, &simulation, after)?;
         if after - shown >= PERIOD {
             shown = after;
-            progress.show(checked(simulation.snapshot(), scene)?);
+            progress.show(checked(simulation.snapshot(), simulation.scene())?);
         }
         before = Instant::now();
     }
@@ -69,13 +76,25 @@ pub(crate) fn run(
         wall_s,
         latency,
         roles: vec![role],
+        notes,
         ..finished(report)
     })
+}
+
+/// Tells the run of a change: why it would not have it, if so.
+fn tell(simulation: &mut Simulation<'_>, told: &Told) -> Result<u64, String> {
+    match told {
+        Told::Change(changes) => (simulation.change(changes)).map_err(|why| why.to_string()),
+        Told::Lose(robot) => simulation.take_part(ControlKind::Down, *robot as usize),
+        Told::Back(robot) => simulation.take_part(ControlKind::Up, *robot as usize),
+    }
 }
 
 /// What a run writes while it goes on.
 struct Files {
     recording: Recording,
+    /// Version of the scene that it is at.
+    version: u32,
     hashes: Option<BufWriter<File>>,
 }
 
@@ -85,6 +104,7 @@ impl Files {
         let every_ns = (1e9 / options.state_rate_hz) as u64;
         Ok(Self {
             hashes: options.hashes.as_deref().map(create).transpose()?,
+            version: 0,
             recording: Recording::start(options.trace.as_deref(), &record, every_ns)
                 .map_err(Failure::system)?,
         })
@@ -97,10 +117,17 @@ impl Files {
 
     fn add_tick(
         &mut self,
-        scene: &Scene,
+        options: &RunOptions,
         simulation: &Simulation<'_>,
         now: Instant,
     ) -> Result<(), Failure> {
+        let scene = simulation.scene();
+        let version = simulation.snapshot().header.scene_version;
+        if version != self.version {
+            self.version = version;
+            let record = SceneRecord::new(scene, &options.settings, RUN_ID);
+            self.recording.change(&record).map_err(Failure::system)?;
+        }
         self.recording
             .motion(simulation.motion(), now)
             .map_err(Failure::system)?;
@@ -182,6 +209,8 @@ fn finished(report: SimReport) -> Finished {
             grants_refused: report.world.grants_refused,
             invalid_requests: report.world.invalid_requests,
             schedules_refused: report.world.schedules_refused,
+            refused_schedule: report.refused.map(|refused| refused.to_string()),
+            scene_changes: u64::from(report.scene_version),
             selection_conflicts: report.world.selection_conflicts,
             violations: report.world.violations,
             swept_tests: report.world.swept_tests,

@@ -63,6 +63,14 @@ impl Recording {
         })
     }
 
+    /// From here on another version of the scene holds.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(crate) fn change(&mut self, scene: &SceneRecord) -> Result<(), RecordingError> {
+        Ok(self.writer.change(scene)?)
+    }
+
     /// Adds the motion and events of a tick.
     ///
     /// # Errors

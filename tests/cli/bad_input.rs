@@ -153,6 +153,22 @@ fn all_mistakes_are_told_at_once_each_on_a_whole_line() {
 }
 
 #[test]
+fn an_order_that_contradicts_itself_names_the_cycle() {
+    let order = "[[before]]\nfirst = \"0.finish\"\nthen = \"1.grasp\"\n\
+                 [[before]]\nfirst = \"1.finish\"\nthen = \"0.start\"\n";
+    let (_directory, path) = file(&(GOOD.to_owned() + order));
+    let cycle =
+        "0.finish before 1.grasp before 1.finish before 0.start before 0.grasp before 0.finish";
+    for command in ["validate", "run"] {
+        let told = stderr(&ends_with(3, &[command, path.to_str().unwrap()]));
+        says(
+            &told,
+            &["room.toml:19:", "the order contradicts itself", cycle],
+        );
+    }
+}
+
+#[test]
 fn too_many_objects_name_the_capacity() {
     let object = "[[objects]]\nstart = [1.0, 1.0]\n";
     let (_directory, path) = file(&(GOOD.to_owned() + &object.repeat(1_024)));

@@ -11,6 +11,7 @@ mod proofs;
 mod rooms;
 mod runs;
 mod streams;
+mod tell;
 mod traces;
 mod usage;
 mod views;

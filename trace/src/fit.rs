@@ -24,7 +24,7 @@ const MAX_WALLS: usize = 4_096;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unfit {
     /// A format of another version of this program.
-    #[error("has format {found}, but this program reads format {FORMAT}")]
+    #[error("has format {found}, but this program reads formats up to {FORMAT}")]
     Format {
         /// The format found.
         found: u32,
@@ -64,6 +64,33 @@ pub enum Unfit {
 }
 
 type Fit = Result<(), Unfit>;
+
+/// What a scene record may say behind another one.
+pub(crate) fn version(next: &SceneRecord, before: &SceneRecord) -> Fit {
+    let same = |what, holds: bool| {
+        if holds {
+            Ok(())
+        } else {
+            Err(Unfit::Place { what })
+        }
+    };
+    same(
+        "changes the room",
+        (next.low, next.high) == (before.low, before.high),
+    )?;
+    same("changes what robots are like", next.robot == before.robot)?;
+    same("changes robots", next.homes == before.homes)?;
+    let is_same = next.objects.len() >= before.objects.len()
+        && next
+            .objects
+            .iter()
+            .zip(&before.objects)
+            .all(|(next, before)| {
+                (&next.shape, next.grasp, next.pass_under)
+                    == (&before.shape, before.grasp, before.pass_under)
+            });
+    same("changes what objects are like", is_same)
+}
 
 fn ensure(holds: bool, what: &'static str) -> Fit {
     if holds {

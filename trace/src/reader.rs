@@ -96,6 +96,7 @@ fn seconds(ns: u64) -> f64 {
 /// One record behind the scene.
 #[derive(Clone, Debug, PartialEq)]
 enum Record {
+    Scene(Box<SceneRecord>),
     Motion(Motion),
     Event(Event),
     State(State),
@@ -118,6 +119,8 @@ pub enum Close {
 /// All records between two marks, in the order of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Span {
+    /// What holds from the beginning of it on, if it is not what held before.
+    pub scene: Option<SceneRecord>,
     /// Pieces of motion.
     pub motions: Vec<Motion>,
     /// Events.
@@ -133,6 +136,8 @@ pub struct Reader<R> {
     file: Frames<R>,
     channels: BTreeMap<u16, Option<Channel>>,
     scene: SceneRecord,
+    /// The newest version of it.
+    present: SceneRecord,
     last: Mark,
     ended: bool,
     over: bool,
@@ -167,7 +172,7 @@ impl<R: Read> Reader<R> {
             format: u32,
         }
         let head: Head = parse(channel, &data, 0)?;
-        if head.format != crate::record::FORMAT {
+        if !(1..=crate::record::FORMAT).contains(&head.format) {
             return Err(unfit(channel, 0, Unfit::Format { found: head.format }));
         }
         let scene: SceneRecord = parse(channel, &data, 0)?;
@@ -175,6 +180,7 @@ impl<R: Read> Reader<R> {
         Ok(Self {
             file,
             channels,
+            present: scene.clone(),
             scene,
             last: Mark {
                 tick: 0,
@@ -185,7 +191,7 @@ impl<R: Read> Reader<R> {
         })
     }
 
-    /// What does not change.
+    /// What holds from the start.
     #[must_use]
     pub const fn scene(&self) -> &SceneRecord {
         &self.scene
@@ -212,7 +218,7 @@ impl<R: Read> Reader<R> {
                 Ok(Some((opcode, body))) => {
                     let message = message(&mut self.channels, opcode, &body, after_ns)?;
                     if let Some((channel, data)) = message {
-                        return decode(channel, &data, &self.scene, after_ns).map(Some);
+                        return decode(channel, &data, &self.present, after_ns).map(Some);
                     }
                 }
                 Ok(None) | Err(FrameError::Cut) => return Ok(None),
@@ -237,8 +243,20 @@ impl<R: Read> Reader<R> {
 
     fn span(&mut self) -> Result<Option<Span>, ReadError> {
         let (mut motions, mut events, mut states) = (Vec::new(), Vec::new(), Vec::new());
+        let mut scene = None;
         let close = loop {
             match self.record()? {
+                Some(Record::Scene(next)) => {
+                    let is_first = motions.is_empty() && events.is_empty() && states.is_empty();
+                    if !is_first || scene.is_some() {
+                        let what = Unfit::Place {
+                            what: "does not come first behind a mark",
+                        };
+                        return Err(unfit(Channel::Scene, self.last.time_ns, what));
+                    }
+                    self.present.clone_from(&next);
+                    scene = Some(*next);
+                }
                 Some(Record::Motion(motion)) => motions.push(motion),
                 Some(Record::Event(event)) => events.push(event),
                 Some(Record::State(state)) => states.push(state),
@@ -257,6 +275,7 @@ impl<R: Read> Reader<R> {
             }
         }
         Ok(Some(Span {
+            scene,
             motions,
             events,
             states,
@@ -307,13 +326,10 @@ fn decode(
     let fits = |fit: Result<(), Unfit>| fit.map_err(|source| unfit(channel, after_ns, source));
     Ok(match channel {
         Channel::Scene => {
-            return Err(unfit(
-                channel,
-                after_ns,
-                Unfit::Place {
-                    what: "comes a second time",
-                },
-            ));
+            let next = parse(channel, data, after_ns)?;
+            fits(fit::scene(&next))?;
+            fits(fit::version(&next, scene))?;
+            Record::Scene(Box::new(next))
         }
         Channel::Motion => {
             let motion = parse(channel, data, after_ns)?;

@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use std::io::Read;
 
 use crate::reader::{Close, ReadError, Reader, Span};
-use crate::record::{BodyKind, Motion, Place, State};
+use crate::record::{BodyKind, Happening, Motion, Place, State};
 
 /// Where every body is at one time.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,6 +60,8 @@ pub struct Replay<R> {
     reader: Reader<R>,
     robots: Vec<Way>,
     objects: Vec<Way>,
+    /// Starts of the objects in the newest version of the scene.
+    starts: Vec<Place>,
     time_ns: u64,
     every_ns: u64,
     known_until_ns: u64,
@@ -82,6 +84,7 @@ impl<R: Read> Replay<R> {
             objects: objects
                 .map(|(id, object)| way(BodyKind::Object, id, object.start))
                 .collect(),
+            starts: scene.objects.iter().map(|object| object.start).collect(),
             reader,
             time_ns: from_ns,
             every_ns: every_ns.max(1),
@@ -91,7 +94,22 @@ impl<R: Read> Replay<R> {
     }
 
     fn take_in(&mut self, span: Span) {
+        if let Some(scene) = &span.scene {
+            let objects = scene.objects.iter().enumerate();
+            for (id, object) in objects.skip(self.objects.len()) {
+                let way = Way::standing(BodyKind::Object, id, object.start, 0);
+                self.objects.push(way);
+            }
+            self.starts = scene.objects.iter().map(|object| object.start).collect();
+        }
         let mut motions = span.motions;
+        motions.extend(span.events.iter().filter_map(|event| match event.what {
+            Happening::Moved { task } => {
+                let place = self.starts[task];
+                Some(rest(BodyKind::Object, task, place, event.time_ns))
+            }
+            _ => None,
+        }));
         if let Some(tick) = self.lost_until
             && let Some(state) = span.states.iter().find(|state| state.tick >= tick)
         {

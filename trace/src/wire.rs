@@ -94,6 +94,16 @@ fn happening(record: &EventRecord) -> Result<Happening, Invalid> {
             other: index(record.other),
             invariant: record.value,
         },
+        EventKind::Changed => Happening::Changed {
+            version: u64::from(record.other),
+        },
+        EventKind::Moved => Happening::Moved { task: task()? },
+        EventKind::ScheduleRefused => Happening::ScheduleRefused {
+            version: record.value & u64::from(u32::MAX),
+            why: shm_types::Refusal::decode(record.other)?.into(),
+            robot: index(record.robot),
+            granted: record.value >> 32,
+        },
     })
 }
 

@@ -94,10 +94,7 @@ impl<W: Write> Writer<W> {
             .create(NoSeek::new(out))?;
         let mut writer = Self {
             file,
-            counts: Counts {
-                robots: u32::try_from(scene.homes.len()).unwrap_or(u32::MAX),
-                objects: u32::try_from(scene.objects.len()).unwrap_or(u32::MAX),
-            },
+            counts: counts(scene),
             state_every_ns,
             state_due_ns: 0,
             resync_from: None,
@@ -120,6 +117,20 @@ impl<W: Write> Writer<W> {
         writer.write(Channel::Scene, 0, scene)?;
         writer.flush()?;
         Ok(writer)
+    }
+
+    /// From here on another version of the scene holds. Give it before the batch that tells of it.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn change(&mut self, scene: &SceneRecord) -> Result<(), WriteError> {
+        // The record comes first behind a mark, whatever has been written since the last one.
+        self.marked = None;
+        self.mark()?;
+        self.counts = counts(scene);
+        self.robots.resize_with(scene.homes.len(), || None);
+        self.objects.resize_with(scene.objects.len(), || None);
+        self.write(Channel::Scene, self.last.time_ns, scene)
     }
 
     fn open(&mut self, channel: Channel) -> Result<(), WriteError> {
@@ -314,5 +325,12 @@ impl<W: Write> Writer<W> {
         self.write(Channel::End, self.last.time_ns, &end)?;
         self.file.finish()?;
         Ok(self.file.into_inner().into_inner())
+    }
+}
+
+fn counts(scene: &SceneRecord) -> Counts {
+    Counts {
+        robots: u32::try_from(scene.homes.len()).unwrap_or(u32::MAX),
+        objects: u32::try_from(scene.objects.len()).unwrap_or(u32::MAX),
     }
 }

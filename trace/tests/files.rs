@@ -414,7 +414,7 @@ fn what_is_no_trace_is_refused_with_the_way_out() {
     assert!(said(&other.into_inner().into_inner()).contains("no trace of this program"));
 
     let mut newer = scene();
-    newer.format = 2;
+    newer.format = 3;
     let writer = Writer::new(Cursor::new(Vec::new()), &newer, 0).unwrap();
     let ending = Ending {
         outcome: Outcome::Stuck,
@@ -423,7 +423,7 @@ fn what_is_no_trace_is_refused_with_the_way_out() {
         options: serde_json::Value::Null,
     };
     let newer = writer.finish(ending).unwrap().into_inner();
-    assert!(said(&newer).contains("format 2, but this program reads format 1"));
+    assert!(said(&newer).contains("format 3, but this program reads formats up to 2"));
 
     let mut damaged = short_run();
     let middle = damaged.len() / 2;

@@ -45,6 +45,13 @@ impl Bars {
         }
     }
 
+    /// Makes room for more of both: counts are by task, so there is nothing to move.
+    pub(crate) fn make_room(&mut self, robots: usize, objects: usize) {
+        self.counts.resize(robots * objects, 0);
+        let more = (robots * objects).saturating_sub(self.parked.len());
+        self.parked.reserve(more);
+    }
+
     /// The counts, for the state hash.
     pub(crate) fn counts(&self) -> &[u32] {
         if self.any { &self.counts } else { &[] }

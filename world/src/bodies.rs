@@ -12,7 +12,7 @@
 
 use std::cell::Cell;
 
-use scene::{Body, ClassId, Scene, Vec2, swept_overlap, swept_regions_overlap};
+use scene::{Body, ClassId, Scene, Vec2, overlap, swept_overlap, swept_regions_overlap};
 
 use crate::broad::{Aabb, Ground, Walls};
 use crate::state::Robot;
@@ -60,10 +60,24 @@ pub(crate) struct Bodies {
 }
 
 impl Bodies {
+    /// All objects at their starts.
     pub(crate) fn new(scene: &Scene) -> Self {
+        Self::with(scene, |object| Some(scene.objects[object].start))
+    }
+
+    /// The same count of tests, with a version of the scene and its objects at these places; none
+    /// for one that is held.
+    pub(crate) fn of_version(&self, scene: &Scene, place: impl Fn(usize) -> Option<Vec2>) -> Self {
+        Self {
+            tests: self.tests.clone(),
+            ..Self::with(scene, place)
+        }
+    }
+
+    fn with(scene: &Scene, place: impl Fn(usize) -> Option<Vec2>) -> Self {
         let classes = scene.objects.iter().map(|o| o.class.0).max().unwrap_or(0) + 1;
         Self {
-            ground: Ground::new(scene),
+            ground: Ground::with(scene, place),
             walls: Walls::new(scene),
             boxes: (0..classes)
                 .map(|class| {
@@ -100,6 +114,15 @@ impl Bodies {
             let (shape, at) = &scene.walls[wall];
             self.count();
             body.sweeps(sweep.from, sweep.to, clearance, shape, *at, *at)
+        })
+    }
+
+    /// Whether an object at `at` would stand in a wall.
+    pub(crate) fn object_meets_wall(&self, scene: &Scene, object: usize, at: Vec2) -> bool {
+        let shape = &scene.objects[object].shape;
+        self.walls.any_near(Aabb::of(shape).at(at), |wall| {
+            let (wall, there) = &scene.walls[wall];
+            overlap(shape, at, wall, *there)
         })
     }
 

@@ -24,8 +24,8 @@ pub(crate) struct Ground {
 }
 
 impl Ground {
-    /// All objects at their starts.
-    pub(crate) fn new(scene: &Scene) -> Self {
+    /// Each object at its place, if it is on the ground.
+    pub(crate) fn with(scene: &Scene, place: impl Fn(usize) -> Option<Vec2>) -> Self {
         let boxes: Vec<Aabb> = scene.objects.iter().map(|o| Aabb::of(&o.shape)).collect();
         let nothing = Aabb::around(Vec2::zeros(), Vec2::zeros());
         let reach = boxes.iter().fold(nothing, |all, b| all.joined(*b));
@@ -35,8 +35,10 @@ impl Ground {
             boxes,
             reach,
         };
-        for (object, spec) in scene.objects.iter().enumerate() {
-            ground.put(object, spec.start);
+        for object in 0..scene.objects.len() {
+            if let Some(at) = place(object) {
+                ground.put(object, at);
+            }
         }
         ground
     }
@@ -161,7 +163,7 @@ mod tests {
             put in proptest::collection::vec((0_usize..12, 0.3..9.7, 0.3..5.7), 0..12),
         ) {
             let scene = scene();
-            let mut ground = Ground::new(&scene);
+            let mut ground = Ground::with(&scene, |object| Some(scene.objects[object].start));
             for object in taken {
                 ground.take(object);
                 prop_assert_eq!(ground.place(object), None);

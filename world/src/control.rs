@@ -8,6 +8,7 @@
 
 use shm_types::{ControlKind, ControlReply, ControlRequest, EventKind, Outcome, RoleKind};
 
+use crate::change::NotMade;
 use crate::journal::{Event, Journal};
 use crate::state::{Hand, Link};
 use crate::step::World;
@@ -19,25 +20,41 @@ impl World {
     /// What the world would reply to `request` if the step of the present tick took it.
     #[must_use]
     pub fn reply_to(&self, request: &ControlRequest) -> ControlReply {
-        let running = self.outcome == Outcome::Running;
-        let known = match (
+        let words = self.object_to(request);
+        ControlReply::new(request.id, words.as_deref().map_or(Ok(self.tick + 1), Err))
+    }
+
+    /// What speaks against a request. Changes of the scene are judged by [`World::prepare`].
+    fn object_to(&self, request: &ControlRequest) -> Option<String> {
+        let (kind, role) = (
             ControlKind::decode(request.kind),
             RoleKind::decode(request.role),
-        ) {
-            (Ok(ControlKind::Up | ControlKind::Down), Ok(RoleKind::Robot)) => {
-                self.robots.get(request.index as usize).is_some_and(|r| {
-                    request.kind == ControlKind::Down.code()
-                        || request.incarnation >= r.link.incarnation
-                })
-            }
-            (Ok(_), Ok(_)) => true,
-            _ => false,
+        );
+        let (Ok(kind), Ok(role)) = (kind, role) else {
+            return Some("this version of the program knows no such request".to_owned());
         };
-        ControlReply {
-            id: request.id,
-            effect_tick: self.tick + 1,
-            accepted: u32::from(running && known),
-            reserved: 0,
+        if self.outcome != Outcome::Running {
+            return Some(NotMade::Over.to_string());
+        }
+        if !matches!(kind, ControlKind::Up | ControlKind::Down) || role != RoleKind::Robot {
+            return None;
+        }
+        let (index, count) = (request.index, self.robots.len());
+        let Some(robot) = self.robots.get(index as usize) else {
+            return Some(format!(
+                "there is no robot {index}: the run has {count}, counted from 0"
+            ));
+        };
+        let link = &robot.link;
+        match kind {
+            ControlKind::Down if !link.live => Some(format!("robot {index} is gone already")),
+            ControlKind::Up if request.incarnation == 0 && link.live => {
+                Some(format!("robot {index} takes part already"))
+            }
+            ControlKind::Up if (1..link.incarnation).contains(&request.incarnation) => {
+                Some(format!("a later process of robot {index} takes part"))
+            }
+            _ => None,
         }
     }
 
@@ -52,13 +69,16 @@ impl World {
             }
             let robot = (request.role == RoleKind::Robot.code()).then_some(request.index as usize);
             match (kind, robot) {
-                (ControlKind::Up, Some(i)) => self.robot_up(i, request.incarnation, journal),
+                (ControlKind::Up, Some(i)) => {
+                    let last = self.robots[i].link.incarnation;
+                    self.robot_up(i, request.incarnation.max(last), journal);
+                }
                 (ControlKind::Down, Some(i)) => self.robot_down(i, journal),
                 (ControlKind::Stop, _) => self.stopped = true,
                 (ControlKind::Hold, _) => self.hold(true, journal),
                 (ControlKind::Resume, _) => self.hold(false, journal),
                 // Other roles hold no bodies: that one is silent is seen from its messages.
-                (ControlKind::Up | ControlKind::Down, None) => {}
+                (ControlKind::Up | ControlKind::Down, None) | (ControlKind::Change, _) => {}
             }
         }
     }
@@ -101,7 +121,7 @@ impl World {
     }
 
     /// Leaves robot `i` standing: no path, no grip in motion, no task but that of what it holds.
-    fn park(&mut self, i: usize, journal: &mut Journal<'_>) {
+    pub(crate) fn park(&mut self, i: usize, journal: &mut Journal<'_>) {
         self.abort_grip(i);
         let robot = &mut self.robots[i];
         robot.give_up_path();
@@ -280,6 +300,7 @@ mod tests {
             role: RoleKind::Robot.code(),
             index,
             incarnation,
+            ..ControlRequest::default()
         };
         let reply = bench.world.reply_to(&request(ControlKind::Up, 0, 2));
         assert_eq!((reply.id, reply.effect_tick, reply.accepted), (9, 4, 1));

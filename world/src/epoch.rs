@@ -19,6 +19,8 @@ pub(crate) struct Epoch {
     pub(crate) number: u64,
     pub(crate) events: u64,
     pub(crate) change: u64,
+    /// Tick whose snapshot is the first to show the newest change.
+    pub(crate) changed_tick: u64,
     pub(crate) placements: u64,
     /// Constraint version when the epoch opened.
     pub(crate) constraints_version: u32,
@@ -33,6 +35,7 @@ impl Epoch {
             number: 1,
             events: 0,
             change: 0,
+            changed_tick: 0,
             placements: 0,
             constraints_version: 0,
             due: false,

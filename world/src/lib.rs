@@ -12,7 +12,7 @@
 //! hold on an object. A *bar* keeps a failed task from the robot it failed for. A *track* is where
 //! a robot is during one tick.
 //!
-//! One step, in this order: control, commands, constraint version, failures, grips that begin,
+//! One step, in this order: a change of the scene, control, commands, constraint version, failures, grips that begin,
 //! grants in space, grants in time, motion, grips that end, bars and epoch, invariants, accounts,
 //! schedule version, outcome, hash. One file each.
 #![forbid(unsafe_code)]
@@ -21,6 +21,7 @@ mod accounts;
 mod bars;
 mod bodies;
 mod broad;
+mod change;
 mod claims;
 mod commands;
 mod constraints;
@@ -47,7 +48,8 @@ mod track;
 mod wire;
 
 pub use accounts::{ActivityTimes, WorldCounters};
+pub use change::{Blocked, Next, NotMade};
 pub use control::FIRST_INCARNATION;
 pub use invariants::Violation;
-pub use schedules::PublishedSchedule;
+pub use schedules::{PublishedSchedule, Refused};
 pub use step::{World, WorldInput};

@@ -7,10 +7,13 @@
 //! What is asked for under one version and not granted is dropped when the next comes into force:
 //! it may go elsewhere now, or wait for others.
 
-use scene::vec;
-use shm_types::{Checked, Schedule, StateHash};
+use std::fmt;
 
-use crate::state::{Robot, is_at};
+use scene::vec;
+use shm_types::{Checked, EventKind, NONE, Refusal, Schedule, StateHash};
+
+use crate::journal::{Event, Journal};
+use crate::state::{Robot, id, is_at};
 use crate::step::World;
 
 /// A schedule as it came: its version, and what it says unless it is no legal message.
@@ -23,6 +26,53 @@ pub(crate) struct Schedules {
     pub(crate) in_force: u32,
     /// The newest brought into force or refused.
     pub(crate) judged: u32,
+    /// The newest that was refused.
+    pub(crate) refused: Option<Refused>,
+}
+
+/// A schedule that was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Refused {
+    /// Its version.
+    pub version: u32,
+    /// Tick whose step refused it.
+    pub tick: u64,
+    /// Why.
+    pub why: Refusal,
+    /// The robot that it does not fit, and how many actions were granted to that one.
+    pub robot: Option<(usize, u32)>,
+}
+
+impl Refused {
+    /// The event that tells of it.
+    pub(crate) fn event(&self) -> Event {
+        let granted = self.robot.map_or(0, |(_, granted)| granted);
+        let value = u64::from(self.version) | u64::from(granted) << 32;
+        let mut event = Event::new(EventKind::ScheduleRefused).value(value);
+        event.robot = self.robot.map_or(NONE, |(robot, _)| id(robot));
+        event.other(self.why.code())
+    }
+}
+
+impl fmt::Display for Refused {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { version, tick, .. } = self;
+        write!(
+            f,
+            "version {version} of the plan was refused in tick {tick}: "
+        )?;
+        match (self.why, self.robot) {
+            (Refusal::Gap, Some((robot, granted))) => write!(
+                f,
+                "it does not go on from the {granted} actions that are granted to robot {robot}"
+            ),
+            (Refusal::Elsewhere, Some((robot, granted))) => write!(
+                f,
+                "robot {robot} has been granted {granted} actions, and they lead elsewhere than it says"
+            ),
+            _ => f.write_str("it is no legal message"),
+        }
+    }
 }
 
 impl Schedules {
@@ -35,7 +85,11 @@ impl Schedules {
 impl World {
     /// Brings `published` into force for the snapshot of the next tick, if it is newer, may be
     /// named by then and goes on from what is granted. Whether it did.
-    pub(crate) fn adopt_schedule(&mut self, published: Option<PublishedSchedule<'_>>) -> bool {
+    pub(crate) fn adopt_schedule(
+        &mut self,
+        published: Option<PublishedSchedule<'_>>,
+        journal: &mut Journal<'_>,
+    ) -> bool {
         let Some((version, schedule)) = published else {
             return false;
         };
@@ -44,11 +98,14 @@ impl World {
             return false;
         }
         self.schedules.judged = version;
-        let fits = schedule.is_some_and(|schedule| {
-            let mut robots = self.robots.iter().enumerate();
-            robots.all(|(i, robot)| goes_on(&schedule, i, robot))
-        });
-        if fits {
+        let misfit = match schedule {
+            None => Some((Refusal::Illegal, None)),
+            Some(schedule) => self.robots.iter().enumerate().find_map(|(i, robot)| {
+                let why = misfit(&schedule, i, robot)?;
+                Some((why, Some((i, robot.granted_actions()))))
+            }),
+        };
+        let Some((why, robot)) = misfit else {
             self.schedules.in_force = version;
             for (i, robot) in self.robots.iter_mut().enumerate() {
                 if schedule.is_some_and(|schedule| schedule.robots[i].count == 0) {
@@ -57,21 +114,35 @@ impl World {
                     robot.keep_whole_actions();
                 }
             }
-        } else {
-            self.counters.schedules_refused += 1;
-        }
-        fits
+            return true;
+        };
+        let refused = Refused {
+            version,
+            tick: self.tick,
+            why,
+            robot,
+        };
+        journal.event(refused.event());
+        self.counters.schedules_refused += 1;
+        self.schedules.refused = Some(refused);
+        false
+    }
+
+    /// The newest schedule that was refused, if one was.
+    #[must_use]
+    pub const fn refused_schedule(&self) -> Option<Refused> {
+        self.schedules.refused
     }
 }
 
-/// Whether a schedule goes on where robot `i`'s grant ends: no gap after what is granted, and
-/// what it lists of that leads where it was granted to. One that lists nothing stops the robot
-/// where its grant ends, be it between the ends of actions.
-fn goes_on(schedule: &Schedule, i: usize, robot: &Robot) -> bool {
+/// Why a schedule does not go on where robot `i`'s grant ends: a gap after what is granted, or
+/// what it lists of that leads elsewhere than it was granted to. One that lists nothing stops the
+/// robot where its grant ends, be it between the ends of actions.
+fn misfit(schedule: &Schedule, i: usize, robot: &Robot) -> Option<Refusal> {
     let granted = robot.granted_actions();
     let part = &schedule.robots[i];
     if part.count == 0 {
-        return part.first <= granted;
+        return (part.first > granted).then_some(Refusal::Gap);
     }
     let leads_to = |number: u32, place| {
         let action = schedule.action(i, number);
@@ -85,15 +156,21 @@ fn goes_on(schedule: &Schedule, i: usize, robot: &Robot) -> bool {
         Some(end) if robot.cut => leads_to(granted, end),
         _ => true,
     };
-    part.first <= granted && granted <= part.first + part.count && last_is_same && part_is_same
+    if part.first > granted || granted > part.first + part.count {
+        Some(Refusal::Gap)
+    } else if !last_is_same || !part_is_same {
+        Some(Refusal::Elsewhere)
+    } else {
+        None
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use scene::{Method, Settings};
     use shm_types::{
-        Action, ControlKind, Grip, NONE, Outcome, Point, RobotSchedule, Schedule, TaskStatus,
-        Verdict, zeroed,
+        Action, ControlKind, EventKind, Grip, NONE, Outcome, Point, Refusal, RobotSchedule,
+        Schedule, TaskStatus, Verdict, zeroed,
     };
 
     use crate::testing::{BELOW, Bench, room};
@@ -336,6 +413,42 @@ mod tests {
             (object.put_downs, object.status),
             (1, TaskStatus::Done.code())
         );
+    }
+
+    #[test]
+    fn what_is_refused_is_told() {
+        let mut bench = bench();
+        bench.schedule = Some(schedule(1, 3, &PLACES));
+        bench.step();
+        let told = bench.events(EventKind::ScheduleRefused)[0];
+        assert_eq!((told.robot, told.value), (0, 1));
+        assert_eq!(told.other, Refusal::Gap.code());
+        assert_eq!(
+            bench.world.refused_schedule().unwrap().to_string(),
+            "version 1 of the plan was refused in tick 0: it does not go on from the 0 actions that \
+             are granted to robot 0"
+        );
+        bench.schedule = Some(schedule(2, 0, &PLACES));
+        bench.step();
+        ask(&mut bench, &PLACES[..1]);
+        bench.step();
+        bench.schedule = Some(schedule(3, 0, &[[2.0, 2.0]]));
+        bench.step();
+        let told = bench.events(EventKind::ScheduleRefused)[0];
+        assert_eq!((told.robot, told.value), (0, 3 | 1 << 32));
+        assert_eq!(told.other, Refusal::Elsewhere.code());
+        assert_eq!((bench.header().schedule_version, refused(&bench)), (2, 2));
+    }
+
+    #[test]
+    fn the_process_that_was_there_last_may_take_part_again() {
+        let mut bench = scheduled();
+        bench.tell(ControlKind::Down, 1, 1);
+        bench.step();
+        assert_eq!(bench.robot(1).live, 0);
+        bench.tell(ControlKind::Up, 1, 0);
+        bench.step();
+        assert_eq!((bench.robot(1).live, bench.robot(1).incarnation), (1, 1));
     }
 
     #[test]

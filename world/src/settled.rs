@@ -19,6 +19,9 @@ use crate::step::World;
 /// in which nothing came of it.
 const SETTLED_TICKS: u32 = 2;
 
+/// Robots or objects that a reason lists one by one.
+const MOST_LISTED: usize = 20;
+
 /// More than a message has room for: what follows would not be the whole truth, so the run ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Overflow {
@@ -114,7 +117,27 @@ impl World {
                 }
             })
         };
-        violation().or_else(overflow).or_else(stuck)
+        violation()
+            .or_else(overflow)
+            .or_else(stuck)
+            .or_else(|| self.missing(scene))
+    }
+
+    /// What a run that was cut short still lacks.
+    fn missing(&self, scene: &Scene) -> Option<String> {
+        if !matches!(self.outcome, Outcome::Timeout | Outcome::Interrupted) {
+            return None;
+        }
+        let objects = self.objects.iter().enumerate();
+        let open = objects.filter(|(_, object)| object.status != TaskStatus::Done);
+        let robots = self.robots.iter().zip(&scene.homes).enumerate();
+        let away = robots.filter(|(_, (robot, home))| !is_at(robot.position, **home));
+        let said = [
+            listed("not at their goals: objects", open.map(|(i, _)| i)),
+            listed("not at home: robots", away.map(|(i, _)| i)),
+        ];
+        let said: Vec<String> = said.into_iter().flatten().collect();
+        (!said.is_empty()).then(|| said.join("; "))
     }
 
     /// How the run stands after this tick.
@@ -150,6 +173,7 @@ impl World {
                 .robots
                 .iter()
                 .zip(&scene.homes)
+                .filter(|(robot, _)| robot.link.live)
                 .all(|(r, home)| r.hand.object().is_none() && is_at(r.position, *home))
     }
 
@@ -162,6 +186,8 @@ impl World {
             p.busy == 0
                 && p.constraints_version <= in_force
                 && p.schedule_version <= self.schedules.judged
+                // One that plans ahead has something to do when something has changed.
+                && (p.tick >= self.epoch.changed_tick || !self.settings.method.plans_ahead())
         });
         idle && !self.held
             && live.peek().is_some()
@@ -171,6 +197,18 @@ impl World {
                     && !r.hand.is_moving()
                     && r.failure.is_none()
             })
+    }
+}
+
+/// Numbers behind a word, the first of them one by one; nothing for none.
+fn listed(what: &str, numbers: impl Iterator<Item = usize>) -> Option<String> {
+    let all: Vec<String> = numbers.map(|number| number.to_string()).collect();
+    let more = all.len().saturating_sub(MOST_LISTED);
+    let first = all[..all.len() - more].join(", ");
+    match (all.len(), more) {
+        (0, _) => None,
+        (_, 0) => Some(format!("{what} {first}")),
+        _ => Some(format!("{what} {first} and {more} more")),
     }
 }
 
@@ -322,5 +360,9 @@ mod tests {
         assert_eq!(bench.world.outcome(), Outcome::Running);
         bench.step();
         assert_eq!(bench.header().outcome, Outcome::Timeout.code());
+        let reason = bench.world.reason(&bench.scene).unwrap();
+        assert_eq!(reason, "not at their goals: objects 0");
+        let words = listed("objects", 0..23).unwrap();
+        assert!(words.ends_with("18, 19 and 3 more"), "{words}");
     }
 }

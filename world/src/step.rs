@@ -13,6 +13,7 @@ use crate::accounts::{self, ActivityTimes, WorldCounters};
 use crate::bars::Bars;
 use crate::bodies::Bodies;
 use crate::broad::Aabb;
+use crate::change::Next;
 use crate::constraints::Constraints;
 use crate::epoch::Epoch;
 use crate::grants::{Grants, Surroundings};
@@ -38,6 +39,9 @@ pub struct WorldInput<'a> {
     pub schedule: Option<PublishedSchedule<'a>>,
     /// Control requests since the last step, in the order of their arrival.
     pub control: &'a [ControlRequest],
+    /// The version of the scene that is in force from this step on, as [`World::prepare`] made it
+    /// since the last step. The only one that allocates.
+    pub change: Option<&'a Next>,
 }
 
 /// The world's step machine. After construction a step allocates nothing.
@@ -56,6 +60,8 @@ pub struct World {
     pub(crate) constraints: Constraints,
     pub(crate) epoch: Epoch,
     pub(crate) schedules: Schedules,
+    /// Version of the scene in force.
+    pub(crate) scene_version: u32,
     /// What the planner says of the run's end.
     pub(crate) verdict: Verdict,
     pub(crate) busy: u32,
@@ -98,6 +104,7 @@ impl World {
             constraints: Constraints::none(),
             epoch: Epoch::first(),
             schedules: Schedules::default(),
+            scene_version: 0,
             verdict: Verdict::Open,
             busy: 0,
             held: false,
@@ -142,6 +149,10 @@ impl World {
         let planner = accounts::report(input.planner);
         let published = input.table.map(Checked::get);
         self.begin_tick();
+        if let Some(next) = input.change {
+            self.take_change(next, &mut journal);
+        }
+        let scene = input.change.map_or(scene, |next| &next.scene);
         self.take_control(input.control, &mut journal);
         self.take_commands(scene, &input, published, &mut journal);
         self.adopt_constraints(published, &mut journal);
@@ -158,7 +169,7 @@ impl World {
             self.tick,
             self.held,
         );
-        let rescheduled = self.adopt_schedule(input.schedule);
+        let rescheduled = self.adopt_schedule(input.schedule, &mut journal);
         self.end_tick(scene, planner, rescheduled, &mut journal);
         self.write_wire();
         self.chain(Some(&input));
@@ -223,7 +234,10 @@ impl World {
         let said = planner.and_then(|report| Verdict::decode(report.verdict).ok());
         self.verdict = said.unwrap_or(self.verdict);
         let outcome = self.judge_outcome(scene, planner, eventful);
-        self.epoch.change += u64::from(eventful);
+        if eventful {
+            self.epoch.change += 1;
+            self.epoch.changed_tick = self.tick + 1;
+        }
         self.tick += 1;
         self.time_ns += self.settings.tick_ns;
         self.outcome = outcome;
@@ -245,6 +259,12 @@ impl World {
     #[must_use]
     pub const fn outcome(&self) -> Outcome {
         self.outcome
+    }
+
+    /// How often the scene was changed.
+    #[must_use]
+    pub const fn scene_version(&self) -> u32 {
+        self.scene_version
     }
 
     /// What the planner has said of the run's end.

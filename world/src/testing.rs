@@ -9,7 +9,7 @@ use shm_types::{
     PlannerReport, Point, RobotState, RoleKind, Schedule, WorldSnapshot,
 };
 
-use crate::{World, WorldInput};
+use crate::{Next, World, WorldInput};
 
 /// Robots 0.5 m square at 0.5 m/s: 5 mm a tick of 10 ms.
 pub(crate) const TICK_M: f64 = 0.005;
@@ -55,6 +55,8 @@ pub(crate) struct Bench {
     pub(crate) table: Option<Box<ConstraintTable>>,
     pub(crate) schedule: Option<Box<Schedule>>,
     pub(crate) control: Vec<ControlRequest>,
+    /// The version of the scene that the next step brings into force.
+    pub(crate) change: Option<Next>,
     pub(crate) batch: Box<MotionBatch>,
     pub(crate) snapshot: Box<WorldSnapshot>,
     /// Robots whose commands are not sent.
@@ -88,6 +90,7 @@ impl Bench {
             table: None,
             schedule: None,
             control: Vec::new(),
+            change: None,
             batch: shm_types::zeroed(),
             snapshot,
         }
@@ -96,6 +99,7 @@ impl Bench {
     /// Sends every command anew and lets one tick pass.
     pub(crate) fn step(&mut self) {
         let tick = self.snapshot.header.tick;
+        self.planner.tick = tick;
         for (command, silent) in self.commands.iter_mut().zip(&self.silent) {
             if !silent {
                 command.sequence += 1;
@@ -129,9 +133,13 @@ impl Bench {
                 .as_deref()
                 .map(|schedule| (schedule.version, Checked::new(schedule, counts).ok())),
             control: &self.control,
+            change: self.change.as_ref(),
         };
         self.world.step(&self.scene, input, &mut self.batch);
         self.control.clear();
+        if let Some(next) = self.change.take() {
+            self.scene = next.scene;
+        }
         self.world.snapshot_into(&mut self.snapshot);
     }
 
@@ -208,6 +216,7 @@ impl Bench {
             role: RoleKind::Robot.code(),
             index: robot,
             incarnation,
+            ..ControlRequest::default()
         });
     }
 

@@ -33,6 +33,7 @@ impl World {
         header.object_count = id(objects);
         header.outcome = self.outcome.code();
         header.held = u32::from(self.held);
+        header.scene_version = self.scene_version;
         for (out, robot) in self.wire.robots.iter_mut().zip(&self.robots) {
             write_robot(out, robot);
         }

@@ -4,7 +4,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use shm_types::{ConstraintKind, ControlKind, FailureCause, NONE, Outcome};
-use world::{World, WorldInput};
+use world::{Next, World, WorldInput};
 
 #[cfg(test)]
 #[path = "../src/testing.rs"]

@@ -6,11 +6,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use scene::Scene;
 use serde::{Deserialize, Serialize};
 use shm_types::Counts;
 use shm_types::capacity::LAYOUT_VERSION;
 
-use crate::domain::{DomainError, RUN_FILE, SCENARIO_FILE, file_error};
+use crate::domain::{DomainError, RUN_FILE, SCENARIO_FILE, file_error, put};
 use crate::options::{Role, RunOptions};
 
 /// `run.json`: what every process of the run starts from, and monitors find it by.
@@ -90,6 +91,34 @@ impl RunFile {
         Ok(run)
     }
 
+    /// The scene of this hash that is, or was, in force in the run in a directory.
+    ///
+    /// # Errors
+    /// It cannot be read, or is none.
+    pub fn read_version(directory: &Path, hash: u64) -> Result<Scene, DomainError> {
+        let path = version_path(directory, hash);
+        let text = fs::read_to_string(&path).map_err(|e| file_error(&path, e))?;
+        let foreign = |reason: String| DomainError::Foreign {
+            path: path.clone(),
+            reason,
+        };
+        let scene = scene::parse_version(&text, "scenario.toml").map_err(|e| foreign(e.plain()))?;
+        if scene.hash == hash {
+            Ok(scene)
+        } else {
+            Err(foreign(format!("its hash is {:016x}", scene.hash)))
+        }
+    }
+
+    /// Writes a version of the scene into the directory of a run, at once or not at all.
+    ///
+    /// # Errors
+    /// The system refused.
+    pub(crate) fn write_version(directory: &Path, scene: &Scene) -> Result<(), DomainError> {
+        let path = version_path(directory, scene.hash);
+        put(&path, scene::to_canonical_toml(scene).as_bytes())
+    }
+
     /// The canonical scenario text of the run in a directory.
     ///
     /// # Errors
@@ -98,4 +127,9 @@ impl RunFile {
         let path = directory.join(SCENARIO_FILE);
         fs::read_to_string(&path).map_err(|e| file_error(&path, e))
     }
+}
+
+/// Versions are known by their hash, so that no two processes can mean different ones.
+fn version_path(directory: &Path, hash: u64) -> PathBuf {
+    directory.join(format!("scenario-{hash:016x}.toml"))
 }

@@ -8,11 +8,12 @@ use std::fs::{self, DirBuilder, File, OpenOptions};
 use std::io::{self, Read};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use rustix::fs::{FlockOperation, flock};
 
 use crate::domain::{
-    DomainError, LOCK_FILE, MAX_ROOT_AND_PREFIX, RunDirectory, RunFile, file_error,
+    DomainError, LATEST, LOCK_FILE, MAX_ROOT_AND_PREFIX, RunDirectory, RunFile, file_error,
 };
 use crate::shared_memory;
 
@@ -127,9 +128,17 @@ fn check_private(path: &Path) -> Result<(), DomainError> {
     })
 }
 
+/// When the run in a directory began.
+pub(super) fn began(directory: &Path) -> Option<SystemTime> {
+    fs::metadata(directory.join(LOCK_FILE))
+        .ok()?
+        .modified()
+        .ok()
+}
+
 pub(super) fn check_name(name: &str) -> Result<(), DomainError> {
     let fine = (1..=64).contains(&name.len())
-        && name != "latest"
+        && name != LATEST
         && !is_id(name)
         && !name.starts_with('.')
         && name

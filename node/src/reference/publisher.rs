@@ -112,6 +112,7 @@ impl Shell {
             table: None,
             schedule: None,
             control: &[],
+            change: None,
         };
         let loan = self.motion.loan_uninit();
         let mut loan = loan.map_err(|e| failed("write to", "motion")(&e))?;

@@ -21,7 +21,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use scene::Scene;
-use shm_types::{Counts, Invalid};
+use shm_types::{Counts, Invalid, SnapshotHeader};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::clock;
@@ -83,7 +83,10 @@ pub enum RoleError {
 pub(crate) struct Seat {
     pub(crate) role: Role,
     pub(crate) run: RunFile,
+    /// The scene in force, as far as this process has seen.
     pub(crate) scene: Scene,
+    /// Its version.
+    scene_version: u32,
     pub(crate) node: IpcNode,
     pub(crate) topics: Topics,
     pub(crate) latencies: Latencies,
@@ -126,6 +129,7 @@ impl Seat {
                 run.options.monitors,
             ),
             scene,
+            scene_version: 0,
             latencies: Latencies::new(),
             stop,
             directory: directory.to_owned(),
@@ -163,8 +167,38 @@ impl Seat {
         &self.run.options
     }
 
-    pub(crate) const fn counts(&self) -> Counts {
-        self.run.counts()
+    pub(crate) fn counts(&self) -> Counts {
+        self.scene.counts()
+    }
+
+    /// Takes over the version of the scene that a snapshot names, if it is another one. Whether it
+    /// is.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub(crate) fn follow(&mut self, header: &SnapshotHeader) -> Result<bool, RoleError> {
+        if header.scene_version == self.scene_version {
+            return Ok(false);
+        }
+        if header.scenario_hash != self.scene.hash {
+            self.scene = RunFile::read_version(&self.directory, header.scenario_hash)?;
+        }
+        self.scene_version = header.scene_version;
+        Ok(true)
+    }
+
+    /// Takes a version of the scene over that this process has made, and writes it down for all
+    /// others.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub(crate) fn write_version(&self, scene: &Scene) -> Result<(), RoleError> {
+        Ok(RunFile::write_version(&self.directory, scene)?)
+    }
+
+    /// Notes what a user should know.
+    pub(crate) fn note(&mut self, text: String) {
+        self.notes.push(text);
     }
 
     /// Where the recorder writes: the place asked for, or one in the run's directory.

@@ -35,6 +35,7 @@ pub fn main(run_dir: &Path) -> Result<(), RoleError> {
     let mut follower = Follower::new(&seat, robots, robots + 1)?;
     seat.settle();
     while let Some(snapshot) = follower.next(&mut seat)? {
+        seat.follow(&snapshot.header)?;
         let snapshot = Checked::new(&*snapshot, seat.counts()).map_err(refused("world"))?;
         shell.answer(&mut seat, snapshot)?;
     }

@@ -13,7 +13,9 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use shm_types::{Checked, EventKind, MotionBatch, Outcome, RecorderReport, WorldSnapshot};
+use shm_types::{
+    Checked, EventKind, MotionBatch, Outcome, RecorderReport, SnapshotHeader, WorldSnapshot,
+};
 use trace::{Ending, SceneRecord, WriteError, Writer};
 use world::FIRST_INCARNATION;
 
@@ -116,10 +118,13 @@ impl Shell {
         let snapshot = self.snapshots.receive()?;
         let before = self.batches;
         while let Some(batch) = self.motion.receive()? {
+            self.follow_batch(seat, &batch)?;
             self.write(&batch)?;
             seat.answering();
         }
         if let Some(snapshot) = snapshot {
+            // Told already, unless the batch that did was lost.
+            self.follow(seat, &snapshot.header)?;
             let snapshot = Checked::new(&*snapshot, seat.counts()).map_err(refused("world"))?;
             self.end_is_out = snapshot.header.outcome != Outcome::Running.code();
             self.writer
@@ -136,6 +141,35 @@ impl Shell {
             self.outlet.connect()?;
         }
         Ok(taken)
+    }
+
+    /// Begins a version of the scene with the batch that tells of it.
+    fn follow_batch(&mut self, seat: &mut Seat, batch: &MotionBatch) -> Result<(), RoleError> {
+        let changed = EventKind::Changed.code();
+        let event = batch.events().iter().find(|event| event.kind == changed);
+        match event {
+            None => Ok(()),
+            Some(event) => self.follow(
+                seat,
+                &SnapshotHeader {
+                    scene_version: event.other,
+                    scenario_hash: event.value,
+                    ..SnapshotHeader::default()
+                },
+            ),
+        }
+    }
+
+    /// Writes down the version of the scene that holds from here on, if it is another one.
+    fn follow(&mut self, seat: &mut Seat, header: &SnapshotHeader) -> Result<(), RoleError> {
+        if !seat.follow(header)? {
+            return Ok(());
+        }
+        let settings = &seat.run.options.settings;
+        let scene = SceneRecord::new(&seat.scene, settings, seat.run.id_number());
+        self.writer
+            .change(&scene)
+            .map_err(|error| unwritten(&self.path, &error))
     }
 
     fn write(&mut self, batch: &MotionBatch) -> Result<(), RoleError> {

@@ -13,7 +13,7 @@ mod timing;
 use std::path::Path;
 
 use robot::{Robot, RobotInput};
-use shm_types::{Checked, Command, ConstraintTable, Schedule, WorldSnapshot};
+use shm_types::{Checked, Command, ConstraintTable, Schedule, SnapshotHeader, WorldSnapshot};
 use world::FIRST_INCARNATION;
 
 use crate::clock;
@@ -42,6 +42,7 @@ pub fn main(run_dir: &Path, index: u32) -> Result<(), RoleError> {
     seat.settle();
     while let Some(snapshot) = follower.next(&mut seat)? {
         let received_ns = clock::now_ns();
+        shell.follow(&mut seat, &snapshot.header)?;
         let snapshot = Checked::new(&*snapshot, seat.counts()).map_err(refused("world"))?;
         seat.record_since(Timed::SnapshotCheck, received_ns);
         shell.answer(&mut seat, snapshot)?;
@@ -92,6 +93,18 @@ impl Shell {
             command: Box::default(),
             timing: Timing::default(),
         })
+    }
+
+    /// Takes over the version of the scene that a snapshot names.
+    fn follow(&mut self, seat: &mut Seat, header: &SnapshotHeader) -> Result<(), RoleError> {
+        if seat.follow(header)? {
+            self.robot.enter(&seat.scene);
+            self.tables.recount(seat.counts());
+            if let Some(schedules) = &mut self.schedules {
+                schedules.recount(seat.counts());
+            }
+        }
+        Ok(())
     }
 
     /// One tick: from a snapshot to a command.

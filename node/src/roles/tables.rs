@@ -63,6 +63,14 @@ impl<T: Message + Versioned> Tables<T> {
         })
     }
 
+    /// Checks what is held, and what comes, against another version of the scene.
+    pub(crate) fn recount(&mut self, counts: Counts) {
+        self.counts = counts;
+        for kept in &mut self.kept {
+            kept.invalid = kept.sample.validate(counts).err();
+        }
+    }
+
     /// Takes in what has been published. The version in force is kept, and the newest.
     ///
     /// # Errors

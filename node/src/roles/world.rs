@@ -8,6 +8,7 @@
 //! Both snapshots and batches of motion are written in place. A batch is sent before the snapshot
 //! it led to.
 
+mod changes;
 mod ears;
 mod hashes;
 
@@ -27,6 +28,7 @@ use crate::roles::{RoleError, Seat, Telling};
 use crate::ticker::{Due, Ticker};
 use crate::wait::Waiter;
 use crate::wakes::Waker;
+use changes::Changes;
 use ears::Ears;
 use hashes::HashFile;
 
@@ -65,6 +67,7 @@ struct Shell {
     run_id: u64,
     tick: u64,
     ears: Ears,
+    changes: Changes,
     snapshots: Publisher<WorldSnapshot>,
     motion: Publisher<MotionBatch>,
     waiter: Waiter,
@@ -93,6 +96,7 @@ impl Shell {
             run_id: seat.run.id_number(),
             tick: 0,
             ears: Ears::new(seat)?,
+            changes: Changes::new(&options.changes),
             snapshots: topics.world.service(node, Access::Open)?.publisher()?,
             motion: topics.motion.service(node, Access::Open)?.publisher()?,
             waiter: seat.waiter(sleeper)?,
@@ -124,7 +128,7 @@ impl Shell {
                         ticker.forget_misses();
                     }
                     ticker.wait();
-                    self.ears.listen(&self.world)?;
+                    self.listen(seat)?;
                     !seat.is_stopped()
                 }
                 None => self.wait_for_all(seat)?,
@@ -149,7 +153,7 @@ impl Shell {
     /// for the end. Lets late joiners in meanwhile. `false` if this process is to end.
     fn wait_for_all(&mut self, seat: &Seat) -> Result<bool, RoleError> {
         loop {
-            self.ears.listen(&self.world)?;
+            self.listen(seat)?;
             if self.ears.have_answered(self.tick) || self.ears.stop_is_asked() {
                 self.waiter.arrived();
                 return Ok(true);
@@ -159,6 +163,21 @@ impl Shell {
             }
             self.connect()?;
             self.waiter.pause()?;
+        }
+    }
+
+    fn listen(&mut self, seat: &Seat) -> Result<(), RoleError> {
+        self.ears.listen(seat, &self.world, &mut self.changes)
+    }
+
+    /// Does what the run was given for the present tick.
+    fn do_timed(&mut self, seat: &mut Seat) {
+        while let Some(timed) = self.changes.due(self.tick) {
+            let (world, changes) = (&self.world, &mut self.changes);
+            let done = self.ears.obey_timed(seat, &timed.what, world, changes);
+            if let Err(why) = done {
+                seat.note(timed.not_made(&why));
+            }
         }
     }
 
@@ -172,6 +191,7 @@ impl Shell {
     fn step(&mut self, seat: &mut Seat) -> Result<(), RoleError> {
         let started_ns = clock::now_ns();
         self.ears.take_control(&mut self.control);
+        let change = self.changes.take();
         let mut commands = [None; MAX_ROBOTS];
         self.ears.commands(&mut commands)?;
         let input = WorldInput {
@@ -180,11 +200,16 @@ impl Shell {
             table: self.ears.table()?,
             schedule: self.ears.schedule(),
             control: &self.control,
+            change: change.as_ref(),
         };
         let world = &mut self.world;
         self.motion
             .send(|batch| world.step(&seat.scene, input, batch))?;
         self.tick += 1;
+        if let Some(next) = change {
+            seat.scene = next.scene;
+            self.ears.recount(seat.counts());
+        }
         seat.record_since(Timed::WorldStep, started_ns);
         if let Some(hashes) = &mut self.hashes {
             hashes.add(self.world.state_hash())?;
@@ -218,6 +243,7 @@ impl Shell {
         if let Some(waker) = &self.waker {
             waker.wake()?;
         }
+        self.do_timed(seat);
         Ok(())
     }
 
@@ -227,7 +253,7 @@ impl Shell {
             hashes.flush()?;
         }
         while !seat.is_stopped() {
-            self.ears.listen(&self.world)?;
+            self.listen(seat)?;
             self.connect()?;
             std::thread::sleep(LINGER);
         }
@@ -256,6 +282,8 @@ impl Shell {
             grants_refused: counters.grants_refused,
             invalid_requests: counters.invalid_requests,
             schedules_refused: counters.schedules_refused,
+            refused_schedule: world.refused_schedule().map(|refused| refused.to_string()),
+            scene_changes: u64::from(world.scene_version()),
             selection_conflicts: counters.selection_conflicts,
             violations: counters.violations,
             swept_tests: counters.swept_tests,

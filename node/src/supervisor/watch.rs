@@ -6,7 +6,7 @@
 use std::time::{Duration, Instant};
 
 use shm_types::{
-    Checked, Command, ControlReply, ControlRequest, Counts, Outcome, PlannerReport, RecorderReport,
+    Checked, Command, ControlReply, ControlRequest, Outcome, PlannerReport, RecorderReport,
     SnapshotHeader, WorldSnapshot,
 };
 
@@ -29,7 +29,6 @@ struct Pulse {
 
 /// The supervisor's ports.
 pub(super) struct Watch {
-    counts: Counts,
     snapshots: Subscriber<WorldSnapshot>,
     planner: Subscriber<PlannerReport>,
     recorder: Subscriber<RecorderReport>,
@@ -53,7 +52,6 @@ impl Watch {
             heard: Instant::now(),
         });
         Ok(Self {
-            counts: run.counts(),
             snapshots: topics.world.subscriber()?,
             planner: topics.planner.subscriber()?,
             recorder: topics.recorder.subscriber()?,
@@ -92,10 +90,22 @@ impl Watch {
         if snapshot.header.tick == 0 {
             return;
         }
-        if let Ok(snapshot) = Checked::new(snapshot, self.counts) {
+        if let Ok(snapshot) = Checked::new(snapshot, snapshot.own_counts()) {
             for (index, robot) in (0..).zip(snapshot.robots()) {
-                self.beat(Role::Robot(index), robot.acknowledged);
+                if robot.live == 1 {
+                    self.beat(Role::Robot(index), robot.acknowledged);
+                } else {
+                    self.excuse(Role::Robot(index));
+                }
             }
+        }
+    }
+
+    /// Who takes part no more is not listened to, and so cannot be heard.
+    fn excuse(&mut self, role: Role) {
+        if let Some(pulse) = self.pulses.iter_mut().find(|pulse| pulse.role == role) {
+            pulse.beat = 0;
+            pulse.heard = Instant::now();
         }
     }
 
@@ -154,7 +164,7 @@ impl Watch {
     /// Shows the newest state.
     pub(super) fn show(&self, observer: &mut dyn Observer) {
         let newest = self.newest.as_deref();
-        if let Some(Ok(snapshot)) = newest.map(|newest| Checked::new(newest, self.counts)) {
+        if let Some(Ok(snapshot)) = newest.map(|newest| Checked::new(newest, newest.own_counts())) {
             observer.progress(snapshot);
         }
     }

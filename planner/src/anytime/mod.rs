@@ -208,7 +208,8 @@ impl Anytime {
     /// Plans anew from where everything is, since what the plan assumes is no longer so.
     pub(crate) fn replan(&mut self, snapshot: Checked<WorldSnapshot>) {
         self.stage = match snapshot.header.schedule_version {
-            0 => Stage::New,
+            // Nothing is followed, nor on its way.
+            0 if self.script.is_none() => Stage::New,
             _ => Stage::Stop,
         };
     }

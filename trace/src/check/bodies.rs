@@ -61,6 +61,8 @@ pub(super) struct Bodies {
     bodies: Vec<Body>,
     robots: usize,
     pairs: Pairs,
+    /// Exact tests made in versions of the scene before this one.
+    tests_before: u64,
     walls: Vec<(Shape, Vector)>,
     grid: Grid,
     wall_grid: Grid,
@@ -106,6 +108,7 @@ impl Bodies {
             bodies: Vec::new(),
             robots: scene.homes.len(),
             pairs,
+            tests_before: 0,
             walls,
             wall_grid,
             bounds,
@@ -125,9 +128,38 @@ impl Bodies {
         all
     }
 
+    /// The same bodies where they are, in another version of the scene from `time_ns` on. Those that
+    /// are new stand at their starts.
+    pub(super) fn changed(&self, scene: &SceneRecord, time_ns: u64) -> Self {
+        let mut next = Self::new(scene);
+        next.tests_before = self.tests();
+        for id in 0..next.bodies.len() {
+            let who = next.bodies[id].who;
+            let known = match who {
+                Who::Robot(robot) => robot < self.robots,
+                Who::Object(object) => object < self.bodies.len() - self.robots,
+                Who::Wall(_) | Who::Bounds => false,
+            };
+            let body = &mut next.bodies[id];
+            body.settled_ns = time_ns;
+            body.line = if known {
+                self.bodies[self.index(who)].line
+            } else {
+                Line::Rest(body.line.at(time_ns), time_ns)
+            };
+            next.put(id);
+        }
+        next
+    }
+
+    /// A body, settled just now, stands elsewhere at once.
+    pub(super) fn put_down(&mut self, who: Who, at: Vector, time_ns: u64) {
+        self.replace(who, Line::Rest(at, time_ns));
+    }
+
     /// Exact tests so far.
     pub(super) const fn tests(&self) -> u64 {
-        self.pairs.tests()
+        self.tests_before + self.pairs.tests()
     }
 
     fn index(&self, who: Who) -> usize {

@@ -12,7 +12,7 @@ use super::events::{Context, Events, off_grasp_m};
 use super::report::{Findings, Kind, Who};
 use super::rules::Rules;
 use crate::reader::{Close, Span};
-use crate::record::{End, Event, Mark, Motion, SceneRecord, State};
+use crate::record::{End, Event, Happening, Mark, Motion, SceneRecord, State};
 
 /// What may be added to the way a body can go in a piece of motion, m: what rounding the ends of
 /// a piece to a nanosecond and joining pieces may add.
@@ -81,6 +81,9 @@ impl Checker {
 
     /// Replays what lies between two marks.
     pub(super) fn span(&mut self, mut span: Span) {
+        if let Some(scene) = span.scene.take() {
+            self.change(scene);
+        }
         let until = match &span.close {
             Close::Mark(mark) => *mark,
             Close::Gap(_) | Close::End(_) => self.last,
@@ -99,6 +102,29 @@ impl Checker {
             Close::Gap(gap) => self.lose(gap),
             Close::End(end) => self.end = Some(end),
         }
+    }
+
+    /// Another version of the scene holds from the last mark on: all up to it is held to the one
+    /// before.
+    fn change(&mut self, scene: SceneRecord) {
+        self.settle_all();
+        self.bodies = self.bodies.changed(&scene, self.last.time_ns);
+        self.rules.change(&scene);
+        self.scene = scene;
+    }
+
+    /// Somebody moves an object by hand. Nobody may hold it meanwhile.
+    fn move_by_hand(&mut self, object: usize, time_ns: u64) {
+        let who = Who::Object(object);
+        if let Some(robot) = self.rules.holders[object] {
+            let holder = Who::Robot(robot);
+            self.findings
+                .add(Kind::Holding, time_ns, &[who, holder], || {
+                    format!("{who} is moved by hand while {holder} holds it")
+                });
+        }
+        let start = self.scene.objects[object].start;
+        self.bodies.put_down(who, start.into(), time_ns);
     }
 
     /// Reports and drops what does not belong between the last mark and `until`.
@@ -272,6 +298,9 @@ impl Checker {
         // Rules are about to change for these: all up to now is held to the old ones.
         for who in robot.map(Who::Robot).into_iter().chain(objects) {
             self.settle(who, event.time_ns);
+        }
+        if let Happening::Moved { task } = event.what {
+            self.move_by_hand(task, event.time_ns);
         }
         let mut context = Context {
             scene: &self.scene,

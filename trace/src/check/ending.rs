@@ -62,6 +62,10 @@ impl Checker {
             (self.bodies.at(who, u64::MAX) - Vector2::from(place)).norm() > SAME_PLACE_M
         };
         for (id, home) in self.scene.homes.iter().enumerate() {
+            // Nobody can bring home who is gone.
+            if self.rules.gone[id] {
+                continue;
+            }
             let who = Who::Robot(id);
             if is_off(who, *home) {
                 self.findings.add(Kind::Final, time_ns, &[who], || {

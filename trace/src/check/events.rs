@@ -81,6 +81,7 @@ impl Events {
             // A grip in motion is given up when its robot goes or comes back.
             Happening::RobotUp { robot, .. } | Happening::RobotDown { robot } => {
                 context.rules.hands[robot].grip = Grip::Still;
+                context.rules.gone[robot] = matches!(event.what, Happening::RobotDown { .. });
             }
             Happening::Ended { outcome } => self.ended = Some((event.time_ns, outcome)),
             Happening::Violated { invariant, .. } => {
@@ -94,7 +95,10 @@ impl Events {
             | Happening::Failed { .. }
             | Happening::Constraint { .. }
             | Happening::Held
-            | Happening::Resumed => {}
+            | Happening::Resumed
+            | Happening::Changed { .. }
+            | Happening::Moved { .. }
+            | Happening::ScheduleRefused { .. } => {}
         }
     }
 

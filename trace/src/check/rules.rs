@@ -61,6 +61,8 @@ pub(super) struct Hand {
 pub(super) struct Rules {
     pub(super) hands: Vec<Hand>,
     pub(super) holders: Vec<Option<usize>>,
+    /// Robots that take part no more.
+    pub(super) gone: Vec<bool>,
     pass_under: Vec<bool>,
     lifts_from_below: Vec<bool>,
 }
@@ -83,6 +85,7 @@ impl Rules {
         Self {
             hands: vec![hand; scene.homes.len()],
             holders: vec![None; scene.objects.len()],
+            gone: vec![false; scene.homes.len()],
             pass_under: scene
                 .objects
                 .iter()
@@ -90,6 +93,22 @@ impl Rules {
                 .collect(),
             lifts_from_below: lifts_from_below.collect(),
         }
+    }
+
+    /// Goes on with another version of the scene: nobody holds or claims what is new.
+    pub(super) fn change(&mut self, scene: &SceneRecord) {
+        let Self {
+            mut hands,
+            mut holders,
+            mut gone,
+            pass_under,
+            lifts_from_below,
+        } = Self::new(scene);
+        let (robots, objects) = (self.hands.len(), self.holders.len());
+        self.hands.append(&mut hands.split_off(robots));
+        self.gone.append(&mut gone.split_off(robots));
+        self.holders.append(&mut holders.split_off(objects));
+        (self.pass_under, self.lifts_from_below) = (pass_under, lifts_from_below);
     }
 
     /// Takes over what a state record says. Who is leaving what, it does not say.

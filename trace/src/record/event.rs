@@ -30,6 +30,18 @@ word! {
     }
 }
 
+word! {
+    /// Why a schedule is refused.
+    Refusal {
+        /// It is no legal message.
+        Illegal,
+        /// A robot's actions begin past what is granted to it, or end before.
+        Gap,
+        /// What is granted to a robot leads elsewhere than it says.
+        Elsewhere,
+    }
+}
+
 /// What happens at an instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "event", rename_all = "snake_case")]
@@ -140,6 +152,27 @@ pub enum Happening {
         /// Which invariant, by the world's numbers.
         invariant: u64,
     },
+    /// The scene has changed, as the newest `scene` record says.
+    Changed {
+        /// How often it has.
+        version: u64,
+    },
+    /// Somebody has moved an object by hand: it stands at its start in the newest `scene` record.
+    Moved {
+        /// Which.
+        task: usize,
+    },
+    /// The world has refused a schedule.
+    ScheduleRefused {
+        /// Its version.
+        version: u64,
+        /// Why.
+        why: Refusal,
+        /// The robot that it does not fit.
+        robot: Option<usize>,
+        /// How many actions were granted to that one.
+        granted: u64,
+    },
 }
 
 impl Happening {
@@ -155,9 +188,11 @@ impl Happening {
             Self::ReleaseStarted { robot }
             | Self::RobotUp { robot, .. }
             | Self::RobotDown { robot } => (Some(robot), None),
-            Self::Completed { task } => (None, Some(task)),
+            Self::Completed { task } | Self::Moved { task } => (None, Some(task)),
             Self::Violated { robot, task, .. } => (robot, task),
+            Self::ScheduleRefused { robot, .. } => (robot, None),
             Self::Started
+            | Self::Changed { .. }
             | Self::Constraint { .. }
             | Self::Epoch { .. }
             | Self::Held

@@ -18,12 +18,12 @@ use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use event::{ConstraintKind, Event, FailureCause, Happening};
+pub use event::{ConstraintKind, Event, FailureCause, Happening, Refusal};
 pub use scene::{Instant, Object, Order, Outline, RobotKind, SceneRecord, TaskInstant, Wall};
 pub use state::{Activity, ObjectNow, Phase, RobotNow, State, TaskStatus};
 
-/// Version of the format this crate writes and reads.
-pub const FORMAT: u32 = 1;
+/// Version of the format this crate writes. It reads this one and those before.
+pub const FORMAT: u32 = 2;
 
 /// A point or an offset, m.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -1,4 +1,4 @@
-//! Channel `scene`: everything that does not change.
+//! Channel `scene`: what changes seldom or never.
 //!
 //! Responsible for: the record's parts. Not responsible for: where they come from
 //! (`scene_record`).
@@ -98,7 +98,9 @@ pub struct Order {
     pub then: TaskInstant,
 }
 
-/// Channel `scene`, once, first of all: everything that does not change.
+/// Channel `scene`, first of all, and again, first behind a mark, whenever it changes: what holds
+/// from there on. Robots stay the same, and so do objects but for their goals and their starts;
+/// more of them may come behind them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SceneRecord {
     /// Version of this format.

@@ -58,6 +58,11 @@ function entryAt(timeline, t) {
 
 const robotAt = (i, t) => placeAt(data.robots[i].track, data.homes[i], t);
 const objectAt = (i, t) => placeAt(data.objects[i].track, data.things[i].start, t);
+/** Walls and goals as they are at a time: the scene may change. */
+const versionAt = (t) => entryAt(data.versions, t)[1];
+const goalAt = (i, t) => versionAt(t).goals[i] ?? null;
+/** Objects may come later. */
+const isThere = (i, t) => t >= data.objects[i].since;
 
 /** Closing and opening a grip look alike. */
 const kindOf = (phase) => (phase === "grasping" || phase === "releasing" ? "gripping" : phase);
@@ -70,7 +75,7 @@ function robotDoing(i, t) {
 }
 
 function taskDoing(i, t) {
-  const [status, robot] = entryAt(data.objects[i].doing, t)[1];
+  const [status, robot] = (entryAt(data.objects[i].doing, t) ?? data.objects[i].doing[0])[1];
   return { status, robot };
 }
 
@@ -146,6 +151,9 @@ function sentence(event) {
     case "held": return "all motion is held";
     case "resumed": return "motion goes on";
     case "ended": return `the run ends: ${event.outcome}`;
+    case "changed": return `the scene changes (version ${event.version})`;
+    case "moved": return `somebody moves object ${task}`;
+    case "schedule_refused": return `version ${event.version} of the plan is refused (${event.why})`;
     case "violated": return `the world reports a broken invariant (${event.invariant})`;
     default: return event.event;
   }
@@ -297,9 +305,9 @@ function drawFloor() {
   }
 }
 
-function drawWalls() {
+function drawWalls(t) {
   ctx.beginPath();
-  for (const wall of data.walls) outline(wall.shape, wall.at);
+  for (const wall of versionAt(t).walls) outline(wall.shape, wall.at);
   ctx.fillStyle = colours.wall;
   ctx.fill();
   const [x0, y1] = px(data.low), [x1, y0] = px(data.high);
@@ -319,17 +327,20 @@ function drawPlaces(t) {
   ctx.lineWidth = 1.75;
   ctx.strokeStyle = colours.goal;
   ctx.beginPath();
-  data.things.forEach((thing, i) => { if (thing.goal && completedAt[i] > t) outline(thing.shape, thing.goal, 1); });
+  const open = data.things.flatMap((thing, i) => {
+    const goal = goalAt(i, t);
+    return goal && taskDoing(i, t).status !== "done" ? [[thing, i, goal]] : [];
+  });
+  for (const [thing, , goal] of open) outline(thing.shape, goal, 1);
   ctx.stroke();
   ctx.setLineDash([]);
-  data.things.forEach((thing, i) => {
-    if (thing.goal && completedAt[i] > t) label(String(i), thing.goal, thing.shape, colours.goal, 450);
-  });
+  for (const [thing, i, goal] of open) label(String(i), goal, thing.shape, colours.goal, 450);
 }
 
 function drawWays(t) {
-  data.things.forEach((thing, i) => {
-    if (thing.goal && completedAt[i] > t) line([objectAt(i, t), thing.goal], 1.25, colours.goal, 0.7, [2, 4]);
+  data.things.forEach((_, i) => {
+    const goal = goalAt(i, t);
+    if (goal && taskDoing(i, t).status !== "done") line([objectAt(i, t), goal], 1.25, colours.goal, 0.7, [2, 4]);
   });
 }
 
@@ -362,8 +373,9 @@ function drawGrants(t, carried) {
 
 function drawObjects(t) {
   data.things.forEach((thing, i) => {
+    if (!isThere(i, t)) return;
     const at = objectAt(i, t), { status, robot } = taskDoing(i, t);
-    const name = status === "done" && thing.goal ? "done" : "object";
+    const name = status === "done" && goalAt(i, t) ? "done" : "object";
     ctx.beginPath();
     outline(thing.shape, at, 1);
     ctx.fillStyle = colours[name];
@@ -439,7 +451,7 @@ function draw(t) {
   drawPlaces(t);
   const carried = carriedAt(t);
   if ($("show-grants").checked) drawGrants(t, carried);
-  drawWalls();
+  drawWalls(t);
   if ($("show-ways").checked) drawWays(t);
   drawObjects(t);
   drawRobots(t, carried);
@@ -558,7 +570,7 @@ function showPanels(t) {
   for (const [before, after] of unmet) firsts.set(after, [...(firsts.get(after) || []), before]);
   data.things.forEach((thing, i) => {
     const { status, robot } = taskDoing(i, t);
-    const words = !thing.goal ? "no goal" : status === "done"
+    const words = !isThere(i, t) ? "not there yet" : !goalAt(i, t) ? "no goal" : status === "done"
       ? (completedAt[i] > 0 ? `done at ${seconds(completedAt[i])} s` : "done")
       : `${STATUSES[status]}${robot == null ? "" : ` robot ${robot}`}`;
     setText(taskRows[i][0], words);

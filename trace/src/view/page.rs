@@ -85,6 +85,7 @@ fn data(story: &Story, at_s: f64) -> Value {
     });
     let objects = story.objects.iter().map(|object| {
         json!({
+            "since": object.since_ns,
             "track": track(&object.track),
             "doing": timeline(&object.doing, |doing| task_doing(*doing)),
         })
@@ -97,16 +98,13 @@ fn data(story: &Story, at_s: f64) -> Value {
         "method": method(scene),
         "low": point(scene.low),
         "high": point(scene.high),
-        "walls": scene.walls.iter()
-            .map(|wall| json!({ "shape": shape(&wall.shape), "at": point(wall.at) }))
-            .collect::<Vec<_>>(),
+        "versions": timeline(&story.versions, version),
         "robot": shape(&scene.robot.shape),
         "homes": points(&scene.homes),
-        "things": scene.objects.iter()
-            .map(|object| json!({
+        "things": scene.objects.iter().zip(&story.objects)
+            .map(|(object, story)| json!({
                 "shape": shape(&object.shape),
-                "start": point(object.start),
-                "goal": object.goal.map(point),
+                "start": point(story.start),
             }))
             .collect::<Vec<_>>(),
         "robots": robots.collect::<Vec<_>>(),
@@ -120,6 +118,16 @@ fn data(story: &Story, at_s: f64) -> Value {
         "end": story.end.as_ref().map(|end| json!({
             "outcome": end.outcome, "reason": end.reason, "complete": end.complete,
         })),
+    })
+}
+
+/// What may change in a scene.
+fn version(scene: &SceneRecord) -> Value {
+    let walls = scene.walls.iter();
+    let walls = walls.map(|wall| json!({ "shape": shape(&wall.shape), "at": point(wall.at) }));
+    json!({
+        "walls": walls.collect::<Vec<_>>(),
+        "goals": scene.objects.iter().map(|object| object.goal.map(point)).collect::<Vec<_>>(),
     })
 }
 

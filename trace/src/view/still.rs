@@ -14,7 +14,7 @@ use svg::node::Node;
 use svg::node::element::{Circle, Group, Polygon, Polyline, Rectangle, Style, Text, Title};
 
 use crate::record::{Motion, Outline, Place, TaskStatus};
-use crate::view::story::Story;
+use crate::view::story::{Story, entry_at};
 
 const CSS: &str = include_str!("still.css");
 /// Width of the room, px.
@@ -128,10 +128,11 @@ pub fn still(story: &Story, at_s: f64) -> String {
                 .set("class", "card"),
         )
         .add(rectangle(MARGIN, MARGIN, width, height).set("class", "floor"));
-    picture = picture.add(places(story, &canvas));
+    picture = picture.add(places(story, &canvas, at_ns));
     picture = picture.add(ways(story, &canvas, at_ns));
     let mut walls = Group::new();
-    for wall in &scene.walls {
+    let present = entry_at(&story.versions, at_ns).unwrap_or(scene);
+    for wall in &present.walls {
         walls = walls.add(canvas.shape(&wall.shape, wall.at, "wall"));
     }
     let around = rectangle(MARGIN - 3.0, MARGIN - 3.0, width + 6.0, height + 6.0);
@@ -141,18 +142,17 @@ pub fn still(story: &Story, at_s: f64) -> String {
 }
 
 /// Where objects start and go, and where robots are at home.
-fn places(story: &Story, canvas: &Canvas) -> Group {
+fn places(story: &Story, canvas: &Canvas, at_ns: u64) -> Group {
     let mut group = Group::new();
+    let scene = entry_at(&story.versions, at_ns).unwrap_or(&story.scene);
     for (id, home) in story.scene.homes.iter().enumerate() {
         let home = canvas.shape(&story.scene.robot.shape, *home, "home");
         group = group.add(Group::new().set("class", colour(id)).add(home));
     }
-    for (id, object) in story.scene.objects.iter().enumerate() {
-        group = group.add(canvas.shape(&object.shape, object.start, "start"));
-        group = with(
-            group,
-            canvas.number(id, object.start, &object.shape, "place"),
-        );
+    for (id, object) in scene.objects.iter().enumerate() {
+        let start = story.objects[id].start;
+        group = group.add(canvas.shape(&object.shape, start, "start"));
+        group = with(group, canvas.number(id, start, &object.shape, "place"));
         if let Some(goal) = object.goal {
             group = group.add(canvas.shape(&object.shape, goal, "goal"));
             group = with(group, canvas.number(id, goal, &object.shape, "place"));
@@ -244,7 +244,9 @@ fn line(points: &[(f64, f64)], class: &str, robot: usize, robots: usize) -> Grou
 /// Robots and objects where they are.
 fn bodies(story: &Story, canvas: &Canvas, at_ns: u64) -> Group {
     let mut group = Group::new();
-    for (id, object) in story.scene.objects.iter().enumerate() {
+    let there = |id: usize| story.objects[id].since_ns <= at_ns;
+    let objects = story.scene.objects.iter().enumerate();
+    for (id, object) in objects.filter(|(id, _)| there(*id)) {
         let at = story.object_at(id, at_ns);
         group = group.add(canvas.shape(&object.shape, at, "object"));
         group = with(group, canvas.number(id, at, &object.shape, ""));

@@ -11,8 +11,8 @@ use std::io::Read;
 
 use crate::reader::{Close, ReadError, Reader};
 use crate::record::{
-    Activity, BodyKind, End, Event, Gap, Happening, Motion, Phase, Place, RobotNow, SceneRecord,
-    State, TaskStatus,
+    Activity, BodyKind, End, Event, Gap, Happening, Motion, Object, Phase, Place, RobotNow,
+    SceneRecord, State, TaskStatus,
 };
 
 /// What a robot is at, from a time on.
@@ -44,8 +44,11 @@ pub(crate) struct RobotStory {
 }
 
 /// An object and its task over the whole run.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct ObjectStory {
+    /// When it came, ns, and where.
+    pub(crate) since_ns: u64,
+    pub(crate) start: Place,
     pub(crate) track: Vec<Motion>,
     pub(crate) doing: Timeline<TaskDoing>,
 }
@@ -53,7 +56,10 @@ pub(crate) struct ObjectStory {
 /// Everything a trace tells.
 #[derive(Clone, Debug)]
 pub struct Story {
+    /// The scene at the end.
     pub(crate) scene: SceneRecord,
+    /// Its versions, each from its time (ns) until the next.
+    pub(crate) versions: Timeline<SceneRecord>,
     pub(crate) robots: Vec<RobotStory>,
     pub(crate) objects: Vec<ObjectStory>,
     pub(crate) events: Vec<Event>,
@@ -71,20 +77,14 @@ impl Story {
     /// It is damaged, or not what a trace is.
     pub fn read(mut reader: Reader<impl Read>) -> Result<Self, ReadError> {
         let scene = reader.scene().clone();
-        let waiting = |goal: Option<Place>| TaskDoing {
-            status: goal.map_or(TaskStatus::Done, |_| TaskStatus::Waiting),
-            robot: None,
-        };
         let mut story = Self {
             robots: scene.homes.iter().map(|_| RobotStory::default()).collect(),
             objects: scene
                 .objects
                 .iter()
-                .map(|object| ObjectStory {
-                    track: Vec::new(),
-                    doing: vec![(0, waiting(object.goal))],
-                })
+                .map(|object| ObjectStory::of(object, 0))
                 .collect(),
+            versions: vec![(0, scene.clone())],
             scene,
             events: Vec::new(),
             gaps: Vec::new(),
@@ -94,6 +94,9 @@ impl Story {
         let mut lost: Option<Gap> = None;
         for span in reader.by_ref() {
             let span = span?;
+            if let Some(scene) = span.scene {
+                story.change(scene);
+            }
             if let Some(gap) = lost
                 && let Some(state) = span
                     .states
@@ -143,7 +146,7 @@ impl Story {
         self.end.is_none()
     }
 
-    /// What does not change.
+    /// The scene at the end.
     #[must_use]
     pub const fn scene(&self) -> &SceneRecord {
         &self.scene
@@ -156,8 +159,24 @@ impl Story {
 
     /// Where an object is, m.
     pub(crate) fn object_at(&self, object: usize, time_ns: u64) -> Place {
-        let start = self.scene.objects[object].start;
-        place_at(&self.objects[object].track, start, time_ns)
+        let object = &self.objects[object];
+        place_at(&object.track, object.start, time_ns)
+    }
+
+    /// Another version of the scene holds from now on.
+    fn change(&mut self, scene: SceneRecord) {
+        let now_ns = self.until_ns;
+        for object in &scene.objects[self.objects.len()..] {
+            self.objects.push(ObjectStory::of(object, now_ns));
+        }
+        for (id, object) in scene.objects.iter().enumerate() {
+            let had_goal = self.scene.objects.get(id).and_then(|before| before.goal);
+            if object.goal != had_goal && self.objects[id].since_ns < now_ns {
+                note(&mut self.objects[id].doing, now_ns, waiting(object.goal));
+            }
+        }
+        self.versions.push((now_ns, scene.clone()));
+        self.scene = scene;
     }
 
     fn motion(&mut self, motion: &Motion) {
@@ -229,6 +248,17 @@ impl Story {
 
     /// What is known the instant it happens, before the next state shows it.
     fn event(&mut self, event: Event) {
+        if let Happening::Moved { task } = event.what {
+            let place = self.scene.objects[task].start;
+            self.objects[task].track.push(Motion {
+                body: BodyKind::Object,
+                id: task,
+                start_ns: event.time_ns,
+                end_ns: event.time_ns + 1,
+                from: place,
+                to: place,
+            });
+        }
         let task = match event.what {
             Happening::Claimed { robot, task, .. } => {
                 Some((task, TaskStatus::Claimed, Some(robot)))
@@ -243,6 +273,25 @@ impl Story {
             note(doing, event.time_ns, TaskDoing { status, robot });
         }
         self.events.push(event);
+    }
+}
+
+impl ObjectStory {
+    fn of(object: &Object, since_ns: u64) -> Self {
+        Self {
+            since_ns,
+            start: object.start,
+            track: Vec::new(),
+            doing: vec![(since_ns, waiting(object.goal))],
+        }
+    }
+}
+
+/// How a task stands that nobody has begun.
+fn waiting(goal: Option<Place>) -> TaskDoing {
+    TaskDoing {
+        status: goal.map_or(TaskStatus::Done, |_| TaskStatus::Waiting),
+        robot: None,
     }
 }
 

@@ -15,7 +15,9 @@ use shm_types::{
 };
 use world::{FIRST_INCARNATION, PublishedSchedule, World};
 
+use super::changes::{Changes, changes_of, take_part};
 use crate::calls::Server;
+use crate::options::Told;
 use crate::ports::{Access, Subscriber};
 use crate::roles::tables::Tables;
 use crate::roles::{RoleError, Seat, refused};
@@ -27,7 +29,6 @@ pub(super) const MOST_REQUESTS: usize = 16;
 /// What is known of one robot's process.
 #[derive(Clone, Default)]
 struct Robot {
-    live: bool,
     incarnation: u32,
     /// Whether a command has come at all.
     heard: bool,
@@ -57,7 +58,6 @@ impl Ears {
         let schedules = schedules.map(|service| Tables::new(&service, seat.counts()));
         let constraints = topics.constraints.service(node, Access::Open)?;
         let robot = Robot {
-            live: true,
             incarnation: FIRST_INCARNATION,
             ..Robot::default()
         };
@@ -78,7 +78,12 @@ impl Ears {
     }
 
     /// Takes in all that has come.
-    pub(super) fn listen(&mut self, world: &World) -> Result<(), RoleError> {
+    pub(super) fn listen(
+        &mut self,
+        seat: &Seat,
+        world: &World,
+        changes: &mut Changes,
+    ) -> Result<(), RoleError> {
         while let Some(command) = self.commands.receive()? {
             self.hear(&command);
         }
@@ -97,8 +102,9 @@ impl Ears {
         while self.requests.len() < MOST_REQUESTS
             && let Some(request) = self.control.receive()?
         {
-            self.obey(&request, world);
-            request.answer(world.reply_to(&request))?;
+            let result = self.obey(seat, &request, world, changes);
+            let words = result.as_ref().map(|tick| *tick).map_err(String::as_str);
+            request.answer(ControlReply::new(request.id, words))?;
         }
         Ok(())
     }
@@ -120,33 +126,80 @@ impl Ears {
         robot.command = *command;
     }
 
-    /// Notes what the next step is told, and who takes part from then on.
-    fn obey(&mut self, request: &ControlRequest, world: &World) {
-        let accepted =
-            request.validate(self.counts).is_ok() && world.reply_to(request).accepted == 1;
-        if !accepted {
-            return;
+    /// Notes what the next step is told, and who takes part from then on: the tick that it holds
+    /// from, or why it does not.
+    fn obey(
+        &mut self,
+        seat: &Seat,
+        request: &ControlRequest,
+        world: &World,
+        changes: &mut Changes,
+    ) -> Result<u64, String> {
+        let tick = world.reply_to(request).result()?;
+        if request.kind == ControlKind::Change.code() {
+            let asked = changes_of(request.changes());
+            let asked = asked.ok_or("this version of the program knows no such change")?;
+            // The scene says more clearly than the message what is out of range.
+            return changes.ask(seat, world, tick - 1, &asked);
         }
+        request
+            .validate(self.counts)
+            .map_err(|invalid| invalid.to_string())?;
         self.requests.push(*request);
         if request.role != RoleKind::Robot.code() {
-            return;
+            return Ok(tick);
         }
         let robot = &mut self.robots[request.index as usize];
-        if request.kind == ControlKind::Down.code() {
-            robot.live = false;
-        } else if request.kind == ControlKind::Up.code() {
-            robot.live = true;
+        let is_new = request.incarnation > 0 && request.incarnation != robot.incarnation;
+        if request.kind == ControlKind::Up.code() && is_new {
             robot.incarnation = request.incarnation;
             robot.heard = false;
         }
+        Ok(tick)
     }
 
-    /// Whether every live participant has answered `tick`.
+    /// Does what the run was given for this tick.
+    ///
+    /// # Errors
+    /// Why it does not.
+    pub(super) fn obey_timed(
+        &mut self,
+        seat: &Seat,
+        told: &Told,
+        world: &World,
+        changes: &mut Changes,
+    ) -> Result<u64, String> {
+        let request = match told {
+            Told::Change(asked) => {
+                let tick = world.reply_to(&ControlRequest {
+                    kind: ControlKind::Change.code(),
+                    ..ControlRequest::default()
+                });
+                return changes.ask(seat, world, tick.result()? - 1, asked);
+            }
+            Told::Lose(robot) => take_part(ControlKind::Down, *robot),
+            Told::Back(robot) => take_part(ControlKind::Up, *robot),
+        };
+        self.obey(seat, &request, world, changes)
+    }
+
+    /// Another version of the scene is in force.
+    pub(super) fn recount(&mut self, counts: Counts) {
+        self.counts = counts;
+        self.tables.recount(counts);
+        if let Some(schedules) = &mut self.schedules {
+            schedules.recount(counts);
+        }
+    }
+
+    /// Whether every participant has answered `tick`. A robot that takes part no more has, too: its
+    /// process goes on, so that it may take part again, and is where the others are then. (Where
+    /// a process may be gone, in real time, nobody waits for anybody.)
     pub(super) fn have_answered(&self, tick: u64) -> bool {
         let robots = self
             .robots
             .iter()
-            .all(|robot| !robot.live || (robot.heard && robot.command.tick >= tick));
+            .all(|robot| robot.heard && robot.command.tick >= tick);
         let planner = self.report.is_some_and(|report| report.tick >= tick);
         let recorder = self
             .recorded

@@ -234,6 +234,7 @@ impl Story {
             time_ns: self.now_ns,
         };
         Span {
+            scene: None,
             motions: self.motions,
             events: self.events,
             states: self.states,
@@ -275,6 +276,7 @@ impl Story {
 /// A span with nothing in it.
 pub(super) const fn empty(close: Close) -> Span {
     Span {
+        scene: None,
         motions: Vec::new(),
         events: Vec::new(),
         states: Vec::new(),
