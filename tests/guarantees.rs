@@ -282,10 +282,11 @@ fn compare(rooms: u64, robots: usize) -> (usize, usize) {
             );
         } else {
             not += 1;
-            assert_eq!(
-                (outcome, verdict),
-                (Outcome::Stuck, Verdict::Exhausted),
-                "seed {seed}\n{}",
+            // A proof may be found before everything is looked at.
+            let is_proved = matches!(verdict, Verdict::Exhausted | Verdict::Proved);
+            assert!(
+                outcome == Outcome::Stuck && is_proved,
+                "seed {seed}: {outcome:?}, {verdict:?}\n{}",
                 room.text()
             );
         }
