@@ -55,6 +55,7 @@ fn plan() -> Box<Schedule> {
         count: 5,
         offset: 0,
         complete: 1,
+        kept: u32::MAX,
     };
     let actions = [
         (Point::new(1.0, 0.5), Grip::Keep),
@@ -289,6 +290,7 @@ fn the_grip_of_an_action_that_is_not_listed_any_more_is_still_done() {
         count: 3,
         offset: 2,
         complete: 1,
+        kept: u32::MAX,
     };
     bench.snapshot.header.schedule_version = 2;
     assert_eq!(bench.step(), (Phase::Grasping, Activity::Gripping));

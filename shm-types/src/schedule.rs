@@ -18,7 +18,8 @@ tag! {
     pub enum Refusal {
         /// It is no legal message: a count, an id or a number is out of range.
         Illegal = 0,
-        /// A robot's actions begin past what is granted to it, or end before.
+        /// A robot's actions begin past what is granted to it, or end before, or are not those
+        /// of the version before any more.
         Gap = 1,
         /// What is granted to a robot leads elsewhere than it says.
         Elsewhere = 2,
@@ -81,6 +82,10 @@ pub struct RobotSchedule {
     pub offset: u32,
     /// 1 if nothing comes after the last one listed.
     pub complete: u32,
+    /// How many of its actions are as the version before had them: where more are granted when the
+    /// schedule would come into force, it does not, since who goes first may be another one.
+    /// `u32::MAX` where nothing has changed.
+    pub kept: u32,
 }
 
 /// The next actions of every robot, one version.

@@ -192,6 +192,7 @@ fn schedule() -> Box<Schedule> {
             count,
             offset,
             complete: 1,
+            kept: u32::MAX,
         };
     }
     for action in &mut schedule.actions[..3] {

@@ -59,6 +59,7 @@ pub(crate) fn schedule(robots: &[Vec<Step>]) -> Box<Schedule> {
             count: steps.len() as u32,
             offset: schedule.action_count,
             complete: 1,
+            kept: u32::MAX,
         };
         for step in steps {
             schedule.actions[schedule.action_count as usize] = Action {

@@ -156,7 +156,8 @@ fn misfit(schedule: &Schedule, i: usize, robot: &Robot) -> Option<Refusal> {
         Some(end) if robot.cut => leads_to(granted, end),
         _ => true,
     };
-    if part.first > granted || granted > part.first + part.count {
+    let begun = granted.saturating_add(u32::from(robot.cut));
+    if part.first > granted || granted > part.first + part.count || begun > part.kept {
         Some(Refusal::Gap)
     } else if !last_is_same || !part_is_same {
         Some(Refusal::Elsewhere)
@@ -198,6 +199,7 @@ mod tests {
             count,
             offset: 0,
             complete: 1,
+            kept: u32::MAX,
         };
         for (action, place) in schedule.actions.iter_mut().zip(places) {
             *action = Action {
@@ -376,6 +378,19 @@ mod tests {
         bench.step();
         assert_eq!((bench.header().schedule_version, refused(&bench)), (3, 0));
         assert_eq!(bench.robot(0).actions, 1);
+    }
+
+    #[test]
+    fn where_more_is_granted_than_a_schedule_keeps_it_is_refused() {
+        for (kept, refusals) in [(0, 1), (1, 1), (2, 0)] {
+            let mut bench = partly_granted();
+            let mut plan = schedule(2, 0, &[[3.0, 1.0], [8.0, 1.0]]);
+            plan.robots[0].kept = kept;
+            bench.schedule = Some(plan);
+            bench.step();
+            // One action is granted, and a part of the next.
+            assert_eq!(refused(&bench), refusals, "{kept}");
+        }
     }
 
     #[test]

@@ -444,7 +444,7 @@ impl Anytime {
             return false;
         }
         solver.accept_better();
-        better.write(|robot| robots[robot].actions, out);
+        better.write_new(|robot| robots[robot].actions, out);
         self.replaced = self.script.replace(better);
         true
     }

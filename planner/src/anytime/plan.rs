@@ -47,9 +47,18 @@ impl Plan {
         }
     }
 
-    /// Nothing committed but what is done whatever is planned.
+    /// Nothing committed but what is done whatever is planned. That waits for nothing that is
+    /// planned now, so it comes first wherever both need the same space.
     pub(crate) fn begin(&mut self, ground: &Ground, start: &Start, limit: Time) {
+        self.lay(ground, start);
         self.limit = limit;
+        if start.robots.iter().any(|track| track.kept > 0) {
+            self.timeline.let_pass(self.robots);
+        }
+    }
+
+    fn lay(&mut self, ground: &Ground, start: &Start) {
+        self.limit = EVER;
         self.timeline.clear();
         self.tracks.clone_from(&start.robots);
         for (robot, track) in self.tracks.iter().enumerate() {
@@ -271,7 +280,7 @@ impl Plan {
             track.deeds.push(deed);
             track.end.1 = now;
         }
-        self.begin(ground, &start, EVER);
+        self.lay(ground, &start);
     }
 
     /// Takes a plan over that began at `start`.
@@ -281,7 +290,7 @@ impl Plan {
             robots: tracks,
             objects,
         };
-        self.begin(ground, &whole, EVER);
+        self.lay(ground, &whole);
     }
 
     /// As [`Self::commit`]; if parked robots are in the way, they go elsewhere first.
@@ -592,7 +601,7 @@ impl Plan {
 }
 
 /// Enters all that a robot does.
-fn enter(timeline: &mut Timeline, ground: &Ground, owner: Owner, track: &Track) {
+pub(super) fn enter(timeline: &mut Timeline, ground: &Ground, owner: Owner, track: &Track) {
     let alone = ROBOT_ALONE.0;
     let mut walker = timeline.enter(ground, owner, alone, track.start, 0);
     let mut cell = track.start;

@@ -51,6 +51,8 @@ struct Part {
     first: u32,
     /// How many there were before anything was planned.
     begun: u32,
+    /// How many are as they were in the plan before.
+    kept: u32,
     /// Each with what it waits for.
     actions: Vec<(Action, Vec<Wait>)>,
 }
@@ -122,10 +124,14 @@ impl Script {
             });
             let known = &before.robots[robot];
             let kept = &known.actions[..(part.kept - known.first) as usize];
+            let actions: Vec<_> = kept.iter().cloned().chain(actions).collect();
+            // The last piece, to where the robot stays, comes after all deeds.
+            let is_same = actions.len() == known.actions.len() && actions.len() <= kept.len() + 1;
             Part {
                 first: known.first,
                 begun: known.begun,
-                actions: kept.iter().cloned().chain(actions).collect(),
+                kept: if is_same { u32::MAX } else { part.kept },
+                actions,
             }
         };
         Self {
@@ -151,36 +157,44 @@ impl Script {
         &part.actions[action - part.first as usize].1
     }
 
-    /// Whether robots may go on with `other` where they are: all that may be granted to them
-    /// before it is in force is the same.
+    /// Whether robots can go on with `other` where they are: it keeps all that may be granted to
+    /// them before it is in force. What only looks the same does not count: who goes first may be
+    /// another one.
     pub(crate) fn agrees(&self, other: &Self, robots: &[RobotState]) -> bool {
+        let is_over = |wait: &Wait| robots[wait.robot as usize].actions >= wait.actions;
         let mut scripts = robots.iter().zip(self.robots.iter().zip(&other.robots));
         scripts.all(|(state, (mine, others))| {
             let granted = state.actions.saturating_sub(mine.first) as usize;
-            let ahead = (mine.actions.iter().enumerate()).skip(granted.saturating_sub(1));
-            for (number, (action, _)) in ahead.take(1 + ACTIONS_AHEAD as usize) {
-                let known = others.actions.get(number).map(|(known, _)| known);
-                let is_same = |known: &Action| {
-                    known.to == action.to
-                        && (known.grip, known.object) == (action.grip, action.object)
-                };
-                if !known.is_some_and(is_same) {
-                    return false;
+            let ahead = mine.actions.iter().skip(granted);
+            let mut asked = granted;
+            for (action, waits) in ahead.take(ACTIONS_AHEAD as usize) {
+                if !waits.iter().all(is_over) {
+                    break;
                 }
-                if number >= granted && action.grip != Grip::Keep.code() {
+                asked += 1;
+                if action.grip != Grip::Keep.code() {
                     break;
                 }
             }
-            true
+            mine.first + asked as u32 <= others.kept
         })
     }
 
     /// Writes the next actions of each robot, from the last one that is granted to it (so many
-    /// are): as many as a message has room for.
+    /// are): as many as a message has room for. It is in force already, or nothing that robots
+    /// follow has changed.
     pub(crate) fn write(&self, granted: impl Fn(usize) -> u32, out: &mut Schedule) {
         let mut window = MAX_ACTIONS / self.robots.len().max(1);
         while !self.fits(&granted, window, out) {
             window /= 2;
+        }
+    }
+
+    /// As [`Self::write`], of a script that takes the place of another one.
+    pub(crate) fn write_new(&self, granted: impl Fn(usize) -> u32, out: &mut Schedule) {
+        self.write(granted, out);
+        for (part, listed) in self.robots.iter().zip(&mut out.robots) {
+            listed.kept = part.kept;
         }
     }
 
@@ -197,6 +211,7 @@ impl Script {
                 count: listed.len() as u32,
                 offset: actions as u32,
                 complete: u32::from(listed.len() == ahead.len()),
+                kept: u32::MAX,
             };
             for (action, waited) in listed {
                 let end = waits + waited.len();
@@ -414,6 +429,7 @@ impl Part {
         Self {
             first: last.unwrap_or(robot.actions),
             begun: robot.actions,
+            kept: robot.actions,
             actions: (last.iter().map(|_| (moving(point(robot.at)), Vec::new()))).collect(),
         }
     }
@@ -488,6 +504,7 @@ mod tests {
         let part = Part {
             first: 0,
             begun: 0,
+            kept: 0,
             actions: listed.collect(),
         };
         Script {

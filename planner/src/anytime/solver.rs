@@ -480,6 +480,11 @@ impl Solver {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::anytime::keep::kept;
+    use crate::anytime::plan::enter;
+    use crate::anytime::publish::Script;
+    use crate::anytime::timeline::Timeline;
+    use crate::anytime::track::Deed;
 
     /// When robots keep others away from where: class, cell, robot, from, to.
     type Span = (usize, u32, u32, Time, Time);
@@ -524,5 +529,68 @@ mod tests {
                 assert!(found == reserved(&solver), "seed {seed}");
             }
         }
+    }
+
+    /// What is kept waits for nothing that is planned later: so it has to come first.
+    #[test]
+    fn what_is_planned_under_way_passes_after_what_is_kept() {
+        let mut shared = 0;
+        for seed in 0..8 {
+            let options = scene::GenerateOptions {
+                seed,
+                objects: 8,
+                area_m2: 30.0,
+                ..scene::GenerateOptions::default()
+            };
+            let scene = scene::generate(&options).unwrap().scene;
+            let situation = Situation::at_start(&scene);
+            let mut solver = Solver::new(&scene, &Settings::default(), &situation).unwrap();
+            let makespan = (0..5).find_map(|attempt| solver.first(&scene, attempt));
+            let makespan = makespan.unwrap();
+            solver.restore().unwrap();
+            let script = Script::of(&scene, &solver.ground, &solver.plan, &situation);
+            let robots = vec![shm_types::RobotState::default(); scene.homes.len()];
+            let goes_on = solver.go_on(&scene, |tracks| {
+                kept(&script, tracks, &robots, makespan / 3)
+            });
+            // Where all moves have begun by then, nothing is left.
+            for _ in 0..if goes_on { 20 } else { 0 } {
+                solver.improve(&scene);
+                shared += assert_kept_first(&solver, seed);
+            }
+        }
+        assert!(shared > 0, "they never meet");
+    }
+
+    /// How often what is planned leads to where somebody else has been before with what is kept.
+    fn assert_kept_first(solver: &Solver, seed: u64) -> usize {
+        let (ground, tracks) = (&solver.ground, solver.plan.tracks());
+        let mut entered = Timeline::new(ground);
+        for (robot, track) in tracks.iter().enumerate() {
+            enter(&mut entered, ground, robot as u32, track);
+        }
+        let mut shared = 0;
+        for (robot, track) in tracks.iter().enumerate() {
+            let (mut cell, mut class) = (track.start, ROBOT_ALONE.0);
+            for (number, deed) in track.deeds.iter().enumerate() {
+                match *deed {
+                    Deed::Grasped(object, ..) => class = ground.carrying(object as usize, 0),
+                    Deed::Released(..) => class = ROBOT_ALONE.0,
+                    Deed::Step(direction, depart, _) => {
+                        cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
+                        for busy in entered.busy(class, cell) {
+                            let owner = busy.owner as usize;
+                            let is_kept = (busy.step as usize) < tracks[owner].kept;
+                            if number >= track.kept && owner != robot && is_kept {
+                                shared += 1;
+                                let to = busy.to;
+                                assert!(to <= depart, "{seed}: {robot} at {depart}, {busy:?}");
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        shared
     }
 }

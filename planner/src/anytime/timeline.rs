@@ -83,6 +83,18 @@ impl Timeline {
         }
     }
 
+    /// Keeps everybody else away from where those below `robots` will be, until they have left:
+    /// nobody passes before them.
+    pub(crate) fn let_pass(&mut self, robots: Owner) {
+        for &index in &self.touched {
+            let list = &mut self.lists[index as usize];
+            for busy in list.iter_mut().filter(|busy| busy.owner < robots) {
+                busy.from = 0;
+            }
+            list.sort_by_key(|busy| busy.from);
+        }
+    }
+
     #[inline]
     fn index(&self, class: usize, cell: u32) -> usize {
         class * self.points + cell as usize
