@@ -57,9 +57,7 @@ pub(crate) fn kept(
         }
         // An object that others have moved before must have been put down.
         for deed in &track.deeds[before..end] {
-            if let Deed::Grasped(object, turn, ..) = *deed
-                && turn > 0
-            {
+            if let Deed::Grasped(object, turn, ..) = *deed {
                 open.extend(put_down(tracks, object, turn));
             }
         }
@@ -95,31 +93,26 @@ fn deeds_for(script: &Script, wait: Wait) -> usize {
         .min(deeds.len())
 }
 
-/// Whoever puts an object down for the `turn`-th time, and how many deeds that takes.
+/// Whoever moves an object just before its move of this turn, and how many deeds that takes; none
+/// if nobody does in this plan.
 fn put_down(tracks: &[Track], object: u32, turn: u32) -> Option<(usize, usize)> {
-    let mut releases: Vec<(Time, usize, usize)> = Vec::new();
-    for (robot, track) in tracks.iter().enumerate() {
-        for (deed, done) in track.deeds.iter().enumerate() {
-            if let Deed::Released(of, time) = *done
-                && of == object
-            {
-                releases.push((time, robot, deed + 1));
-            }
-        }
-    }
-    releases.sort_unstable();
-    let (_, robot, deeds) = *releases.get(turn as usize - 1)?;
-    Some((robot, deeds))
+    let before = turn.checked_sub(1)?;
+    tracks.iter().enumerate().find_map(|(robot, track)| {
+        let is_it =
+            |deed: &Deed| matches!(*deed, Deed::Grasped(o, t, ..) if (o, t) == (object, before));
+        let grasped = track.deeds.iter().position(is_it)?;
+        let carried = track.deeds[grasped..].iter();
+        let released = carried.take_while(|deed| !matches!(deed, Deed::Released(..)));
+        Some((robot, grasped + released.count() + 1))
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use scene::Settings;
     use shm_types::RobotState;
 
     use super::*;
-    use crate::anytime::situation::Situation;
-    use crate::anytime::solver::Solver;
+    use crate::anytime::solver::testing::{planned, written};
 
     #[test]
     fn what_is_kept_waits_for_nothing_else_and_ends_with_free_hands() {
@@ -130,18 +123,8 @@ mod tests {
                 crowding: 0.8,
                 ..scene::GenerateOptions::default()
             };
-            let scene = scene::generate(&options).unwrap().scene;
-            let mut solver =
-                Solver::new(&scene, &Settings::default(), &Situation::at_start(&scene)).unwrap();
-            let makespan = (0..5).find_map(|attempt| solver.first(&scene, attempt));
-            let makespan = makespan.unwrap();
-            solver.restore().unwrap();
-            let script = Script::of(
-                &scene,
-                &solver.ground,
-                &solver.plan,
-                &Situation::at_start(&scene),
-            );
+            let (scene, mut solver, makespan) = planned(&options);
+            let script = written(&scene, &mut solver);
             let tracks = solver.plan.tracks();
             for share in 0..10 {
                 let robots = vec![RobotState::default(); tracks.len()];

@@ -10,28 +10,21 @@
 //! closely as the world allows. Every wait is for something planned earlier, so waits form no
 //! ring. Steps are joined where nothing is waited for, in either direction.
 
-use scene::{CONTACT_M, Event, Scene, UserOrder, Vec2, point};
+mod needs;
+
+use scene::{CONTACT_M, Scene, Vec2, point};
 use shm_types::capacity::MAX_ACTIONS;
 use shm_types::{Action, Grip, NONE, RobotSchedule, RobotState, Schedule, Wait};
 
 use crate::anytime::ground::Ground;
 use crate::anytime::keep::ACTIONS_AHEAD;
 use crate::anytime::plan::Plan;
-use crate::anytime::route::sides;
+use crate::anytime::publish::needs::{Need, add_user_order, needs_of};
 use crate::anytime::situation::{RobotAt, Situation};
-use crate::anytime::track::{Deed, Track};
+use crate::anytime::track::Deed;
 
 /// Most steps in one action.
 const MAX_STEPS: u32 = 20;
-
-/// What one step waits for.
-struct Need {
-    /// The robot's deed that waits.
-    deed: u32,
-    /// Whom it waits for, and that one's deed.
-    robot: u32,
-    until: u32,
-}
 
 /// Actions of one robot, and which one each deed is part of.
 struct Joined {
@@ -230,99 +223,6 @@ impl Script {
         (out.action_count, out.wait_count) = (actions as u32, waits as u32);
         true
     }
-}
-
-/// Whom each step of a robot waits for: only what the steps before have not waited for already.
-fn needs_of(ground: &Ground, plan: &Plan, robot: u32, track: &Track) -> Vec<Need> {
-    let robots = plan.tracks().len();
-    let mut waited_for = vec![None; robots];
-    let mut needs = Vec::new();
-    let mut class = 0;
-    let mut cell = track.start;
-    for (deed, done) in track.deeds.iter().enumerate() {
-        let (direction, depart) = match *done {
-            Deed::Step(direction, depart, _) => (direction as usize, depart),
-            Deed::Grasped(object, .., by) => {
-                class = ground.carrying(object as usize, by);
-                continue;
-            }
-            Deed::Released(..) => {
-                class = 0;
-                continue;
-            }
-        };
-        let next = cell.wrapping_add_signed(ground.offsets[direction]);
-        if deed < track.kept {
-            cell = next;
-            continue;
-        }
-        let mut look = |class: usize, at: u32| {
-            for busy in plan.timeline().busy(class, at) {
-                let other = busy.owner as usize;
-                if busy.owner != robot && other < robots && busy.to <= depart {
-                    let before: &mut Option<u32> = &mut waited_for[other];
-                    if before.is_none_or(|before| before < busy.step) {
-                        *before = Some(busy.step);
-                        needs.push(Need {
-                            deed: deed as u32,
-                            robot: busy.owner,
-                            until: busy.step,
-                        });
-                    }
-                }
-            }
-        };
-        look(class, next);
-        for side in sides(ground, cell, direction).into_iter().flatten() {
-            look(class, side);
-        }
-        if let Some(Deed::Grasped(object, .., by)) = track.deeds.get(deed + 1) {
-            look(ground.carrying(*object as usize, *by), next);
-        }
-        cell = next;
-    }
-    needs
-}
-
-/// What comes second in the user's order waits for what its robot does after what comes first.
-fn add_user_order(plan: &Plan, order: UserOrder, needs: &mut [Vec<Need>]) {
-    let (Some(first), Some(then)) = (find(plan, order.first), find(plan, order.then)) else {
-        return;
-    };
-    if first.0 == then.0 || then.1 < plan.tracks()[then.0].kept {
-        return;
-    }
-    let need = Need {
-        // The step that leads there.
-        deed: then.1.saturating_sub(1) as u32,
-        robot: first.0 as u32,
-        until: first.1 as u32 + 1,
-    };
-    let list = &mut needs[then.0];
-    let place = list.partition_point(|other| other.deed <= need.deed);
-    list.insert(place, need);
-}
-
-/// The robot and the deed that are an event of an object: its first grasp, its last release.
-fn find(plan: &Plan, (object, event): (usize, Event)) -> Option<(usize, usize)> {
-    let deeds = (plan.tracks().iter().enumerate()).flat_map(|(robot, track)| {
-        let deeds = track.deeds.iter().enumerate();
-        deeds.map(move |(number, deed)| (robot, number, *deed))
-    });
-    let found = deeds.filter_map(|(robot, number, deed)| match deed {
-        Deed::Grasped(of, _, time, _) if event != Event::Finish && of as usize == object => {
-            Some((time, robot, number))
-        }
-        Deed::Released(of, time) if event == Event::Finish && of as usize == object => {
-            Some((time, robot, number))
-        }
-        _ => None,
-    });
-    let found = match event {
-        Event::Start | Event::Grasp => found.min(),
-        Event::Finish => found.max(),
-    };
-    found.map(|(_, robot, number)| (robot, number))
 }
 
 /// Joins the steps of a robot after those that it keeps: `kept` says how many actions come before,

@@ -6,10 +6,12 @@
 //! Not responsible for: robots in each other's way, time (`plan`).
 //!
 //! How: depth first over arrangements. Whatever can go to its goal goes there. If nothing can, the
-//! cheapest way of an object *through* others (METHOD 29) tells which of these to set aside, and
+//! cheapest way of an object *through* others (rule 29) tells which of these to set aside, and
 //! they go to the nearest place from which they hinder neither that way nor a goal.
 //!
 //! Terms: an *arrangement* says where each object stands.
+
+mod floods;
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashSet, VecDeque};
@@ -324,91 +326,6 @@ impl Sequencer {
         !open.is_empty()
     }
 
-    /// Blocks what all objects but one keep a class away from.
-    fn block(&mut self, _ground: &Ground, places: &[Rc<Place>], except: usize, class: usize) {
-        self.round += 1;
-        for (object, place) in places.iter().enumerate() {
-            if object != except {
-                for &cell in &place.cells[class] {
-                    self.blocked[cell as usize] = self.round;
-                }
-            }
-        }
-    }
-
-    fn block_cells(&mut self, cells: &[u32]) {
-        for &cell in cells {
-            self.blocked[cell as usize] = self.round;
-        }
-    }
-
-    /// Whether `to` can be reached from `from`, as blocked in this round: greedily.
-    fn finds(&mut self, ground: &Ground, class: usize, from: u32, to: u32) -> bool {
-        self.floods += 1;
-        self.ahead.clear();
-        let walls = ground.walls(class);
-        let blocked = |this: &Self, cell: u32| this.blocked[cell as usize] == this.round;
-        if blocked(self, from) || blocked(self, to) || !walls.is_free(from) {
-            return false;
-        }
-        let far = |cell: u32| {
-            let (dx, dy) = ground.offset(cell, to);
-            dx.abs() + dy.abs()
-        };
-        self.seen[from as usize] = self.round;
-        self.ahead.push((Reverse(far(from)), from));
-        while let Some((_, cell)) = self.ahead.pop() {
-            self.cells += 1;
-            if cell == to {
-                return true;
-            }
-            let steps = walls.steps(cell);
-            for direction in 0..4 {
-                let next = cell.wrapping_add_signed(ground.offsets[direction]);
-                if steps >> direction & 1 == 1
-                    && self.seen[next as usize] != self.round
-                    && !blocked(self, next)
-                {
-                    self.seen[next as usize] = self.round;
-                    self.ahead.push((Reverse(far(next)), next));
-                }
-            }
-        }
-        false
-    }
-
-    /// Whether any of `to` can be reached from any of `from`, as blocked in this round.
-    fn reaches(&mut self, ground: &Ground, class: usize, from: &[u32], to: &[u32]) -> bool {
-        self.floods += 1;
-        self.queue.clear();
-        for &cell in from {
-            if self.blocked[cell as usize] != self.round && ground.walls(class).is_free(cell) {
-                self.seen[cell as usize] = self.round;
-                self.from[cell as usize] = u32::MAX;
-                self.queue.push_back(cell);
-            }
-        }
-        while let Some(cell) = self.queue.pop_front() {
-            self.cells += 1;
-            if to.contains(&cell) {
-                return true;
-            }
-            let steps = ground.walls(class).steps(cell);
-            for direction in 0..4 {
-                let next = cell.wrapping_add_signed(ground.offsets[direction]);
-                if steps >> direction & 1 == 1
-                    && self.seen[next as usize] != self.round
-                    && self.blocked[next as usize] != self.round
-                {
-                    self.seen[next as usize] = self.round;
-                    self.from[next as usize] = cell;
-                    self.queue.push_back(next);
-                }
-            }
-        }
-        false
-    }
-
     /// The cheapest way of a stuck object through others, held by one of its grasps.
     fn crossing(
         &mut self,
@@ -461,71 +378,6 @@ impl Sequencer {
             alone: ways,
             carrying,
         })
-    }
-
-    /// The way with the least price; objects crossed are added to `crossed`.
-    #[expect(clippy::too_many_arguments, reason = "one search, of one thing")]
-    fn cheapest(
-        &mut self,
-        ground: &Ground,
-        places: &[Rc<Place>],
-        object: usize,
-        class: usize,
-        from: &[u32],
-        to: u32,
-        crossed: &mut Vec<usize>,
-    ) -> Option<Vec<u32>> {
-        self.block(ground, places, object, class);
-        self.floods += 1;
-        let mut best = vec![u32::MAX; ground.points()];
-        let mut open = BinaryHeap::new();
-        for &cell in from {
-            if ground.walls(class).is_free(cell) {
-                best[cell as usize] = 0;
-                self.from[cell as usize] = u32::MAX;
-                open.push((Reverse(0), cell));
-            }
-        }
-        while let Some((Reverse(cost), cell)) = open.pop() {
-            if cost > best[cell as usize] {
-                continue;
-            }
-            self.cells += 1;
-            if cell == to {
-                break;
-            }
-            let steps = ground.walls(class).steps(cell);
-            for direction in 0..4 {
-                if steps >> direction & 1 == 0 {
-                    continue;
-                }
-                let next = cell.wrapping_add_signed(ground.offsets[direction]);
-                let price = if self.blocked[next as usize] == self.round {
-                    PRICE
-                } else {
-                    1
-                };
-                if cost + price < best[next as usize] {
-                    best[next as usize] = cost + price;
-                    self.from[next as usize] = cell;
-                    open.push((Reverse(cost + price), next));
-                }
-            }
-        }
-        if best[to as usize] == u32::MAX {
-            return None;
-        }
-        let mut way = vec![to];
-        while self.from[way[way.len() - 1] as usize] != u32::MAX {
-            way.push(self.from[way[way.len() - 1] as usize]);
-        }
-        for (other, place) in places.iter().enumerate() {
-            let meets = |cell: &u32| place.cells[class].binary_search(cell).is_ok();
-            if other != object && way.iter().any(meets) {
-                crossed.push(other);
-            }
-        }
-        Some(way)
     }
 
     /// Places to which an object can be set aside by any of its grasps.

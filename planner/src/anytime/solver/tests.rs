@@ -1,0 +1,108 @@
+//! What reservations have to be true to.
+
+use super::testing::{planned, written};
+use super::*;
+use crate::anytime::keep::kept;
+use crate::anytime::plan::enter;
+use crate::anytime::timeline::Timeline;
+use crate::anytime::track::Deed;
+
+/// When robots keep others away from where: class, cell, robot, from, to.
+type Span = (usize, u32, u32, Time, Time);
+
+fn reserved(solver: &Solver) -> Vec<Span> {
+    let robots = solver.plan.tracks().len();
+    let mut spans: Vec<Span> = Vec::new();
+    for class in 0..solver.ground.classes {
+        for cell in 0..solver.ground.points() as u32 {
+            let busy = solver.plan.timeline().busy(class, cell).iter();
+            let robots = busy.filter(|busy| (busy.owner as usize) < robots);
+            spans.extend(robots.map(|busy| (class, cell, busy.owner, busy.from, busy.to)));
+        }
+    }
+    spans.sort_unstable();
+    // One after the other is one.
+    spans.dedup_by(|next, span| {
+        let goes_on = (next.0, next.1, next.2) == (span.0, span.1, span.2) && next.3 <= span.4;
+        span.4 = if goes_on { span.4.max(next.4) } else { span.4 };
+        goes_on
+    });
+    spans
+}
+
+#[test]
+fn what_is_reserved_after_many_changes_is_what_robots_do_in_the_end() {
+    for seed in 0..6 {
+        let options = scene::GenerateOptions {
+            seed,
+            crowding: 0.8,
+            ..scene::GenerateOptions::default()
+        };
+        let (scene, mut solver, _) = planned(&options);
+        for _ in 0..10 {
+            solver.improve(&scene);
+            let found = reserved(&solver);
+            let tracks = solver.plan.tracks().to_vec();
+            solver.plan.take_over(&solver.ground, &solver.start, tracks);
+            assert!(found == reserved(&solver), "seed {seed}");
+        }
+    }
+}
+
+/// What is kept waits for nothing that is planned later: so it has to come first.
+#[test]
+fn what_is_planned_under_way_passes_after_what_is_kept() {
+    let mut shared = 0;
+    for seed in 0..8 {
+        let options = scene::GenerateOptions {
+            seed,
+            objects: 8,
+            area_m2: 30.0,
+            ..scene::GenerateOptions::default()
+        };
+        let (scene, mut solver, makespan) = planned(&options);
+        let script = written(&scene, &mut solver);
+        let robots = vec![shm_types::RobotState::default(); scene.homes.len()];
+        let goes_on = solver.go_on(&scene, |tracks| {
+            kept(&script, tracks, &robots, makespan / 3)
+        });
+        // Where all moves have begun by then, nothing is left.
+        for _ in 0..if goes_on { 20 } else { 0 } {
+            solver.improve(&scene);
+            shared += assert_kept_first(&solver, seed);
+        }
+    }
+    assert!(shared > 0, "they never meet");
+}
+
+/// How often what is planned leads to where somebody else has been before with what is kept.
+fn assert_kept_first(solver: &Solver, seed: u64) -> usize {
+    let (ground, tracks) = (&solver.ground, solver.plan.tracks());
+    let mut entered = Timeline::new(ground);
+    for (robot, track) in tracks.iter().enumerate() {
+        enter(&mut entered, ground, robot as u32, track);
+    }
+    let mut shared = 0;
+    for (robot, track) in tracks.iter().enumerate() {
+        let (mut cell, mut class) = (track.start, ROBOT_ALONE.0);
+        for (number, deed) in track.deeds.iter().enumerate() {
+            match *deed {
+                Deed::Grasped(object, ..) => class = ground.carrying(object as usize, 0),
+                Deed::Released(..) => class = ROBOT_ALONE.0,
+                Deed::Step(direction, depart, _) => {
+                    cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
+                    for busy in entered.busy(class, cell) {
+                        let owner = busy.owner as usize;
+                        let is_kept = (busy.step as usize) < tracks[owner].kept;
+                        if number >= track.kept && owner != robot && is_kept {
+                            shared += 1;
+                            let to = busy.to;
+                            assert!(to <= depart, "{seed}: {robot} at {depart}, {busy:?}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+    shared
+}
