@@ -171,6 +171,11 @@ impl Seat {
         self.scene.counts()
     }
 
+    /// Version of the scene in force, as far as this process has seen.
+    pub(crate) const fn version(&self) -> u32 {
+        self.scene_version
+    }
+
     /// Takes over the version of the scene that a snapshot names, if it is another one. Whether it
     /// is.
     ///

@@ -122,7 +122,9 @@ impl Shell {
             self.write(&batch)?;
             seat.answering();
         }
-        if let Some(snapshot) = snapshot {
+        // One that is older than the last batch may be of a scene that is no more.
+        let current = snapshot.filter(|snapshot| snapshot.header.scene_version >= seat.version());
+        if let Some(snapshot) = current {
             // Told already, unless the batch that did was lost.
             self.follow(seat, &snapshot.header)?;
             let snapshot = Checked::new(&*snapshot, seat.counts()).map_err(refused("world"))?;
