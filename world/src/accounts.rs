@@ -11,7 +11,7 @@ use crate::state::Robot;
 /// Ticks of one robot by what it did in them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ActivityTimes {
-    ticks: [u64; Activity::ALL.len()],
+    pub(crate) ticks: [u64; Activity::ALL.len()],
 }
 
 impl ActivityTimes {

@@ -11,6 +11,7 @@
 use scene::Vec2;
 use shm_types::{Failure, FailureCause, StateHash, TaskStatus, index};
 
+use crate::saved::{Reader, Saved, Unreadable, saved};
 use crate::state::{Robot, id, is_at};
 use crate::step::World;
 
@@ -23,6 +24,13 @@ struct Parked {
     /// Where the blocker was when it blocked.
     at: Vec2,
 }
+
+saved!(Parked {
+    robot,
+    task,
+    blocker,
+    at
+});
 
 /// What the bit sets of the objects do not say.
 #[derive(Clone, Debug)]
@@ -63,6 +71,51 @@ impl Bars {
             hash.add(&[id(bar.robot), id(bar.task), id(bar.blocker)]);
             hash.add(&scene::point(bar.at));
         }
+    }
+
+    /// Appends all of it. Counts are few and far between, so those that are 0 are left out.
+    pub(crate) fn save(&self, out: &mut Vec<u8>) {
+        let Self {
+            counts,
+            parked,
+            robots: _,
+            any,
+        } = self;
+        any.save(out);
+        parked.save(out);
+        if *any {
+            let counted = || (0..).zip(counts).filter(|(_, count)| **count > 0);
+            counted().count().save(out);
+            counted().for_each(|(at, count): (usize, &u32)| (at, *count).save(out));
+        }
+    }
+
+    /// Puts what was saved in the place of what there is, which keeps its memory.
+    pub(crate) fn restore(&mut self, from: &mut Reader<'_>) -> Result<(), Unreadable> {
+        self.any = Saved::restore(from)?;
+        let most = self.counts.len();
+        let parked: Vec<Parked> = Saved::restore(from)?;
+        if parked.len() > most {
+            return Err(Unreadable::Many(parked.len() as u64));
+        }
+        self.parked.clear();
+        self.parked.extend(parked);
+        self.counts.fill(0);
+        if self.any {
+            for _ in 0..from.count()? {
+                let (at, count): (usize, u32) = Saved::restore(from)?;
+                let slot = self.counts.get_mut(at);
+                *slot.ok_or(Unreadable::Many(at as u64))? = count;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether all that is named exists.
+    pub(crate) fn is_sound(&self, robots: usize, objects: usize) -> bool {
+        self.parked
+            .iter()
+            .all(|bar| bar.robot < robots && bar.blocker < robots && bar.task < objects)
     }
 }
 

@@ -6,6 +6,7 @@
 use shm_types::{ConstraintTable, EventKind, StateHash};
 
 use crate::journal::{Event, Journal};
+use crate::saved::{Reader, Saved, Unreadable};
 use crate::step::World;
 
 /// The table in force, and how much of it has been told.
@@ -48,6 +49,33 @@ impl Constraints {
     pub(crate) fn hash_into(&self, hash: &mut StateHash) {
         self.in_force.hash_into(hash);
         hash.add(&(self.next as u64));
+    }
+
+    /// Appends all of it.
+    pub(crate) fn save(&self, out: &mut Vec<u8>) {
+        let Self {
+            in_force,
+            before,
+            next,
+        } = self;
+        in_force.save(out);
+        before.save(out);
+        next.save(out);
+    }
+
+    /// Puts what was saved in the place of what there is.
+    pub(crate) fn restore(&mut self, from: &mut Reader<'_>) -> Result<(), Unreadable> {
+        *self = Self {
+            in_force: Saved::restore(from)?,
+            before: Saved::restore(from)?,
+            next: Saved::restore(from)?,
+        };
+        Ok(())
+    }
+
+    /// Both tables.
+    pub(crate) const fn tables(&self) -> [&ConstraintTable; 2] {
+        [&*self.in_force, &*self.before]
     }
 
     /// Whether the table in force holds a constraint that the one before it did not.

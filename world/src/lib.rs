@@ -22,6 +22,7 @@ mod bars;
 mod bodies;
 mod broad;
 mod change;
+mod checkpoint;
 mod claims;
 mod commands;
 mod constraints;
@@ -37,6 +38,7 @@ mod path;
 #[cfg(test)]
 mod random;
 mod requests;
+mod saved;
 mod schedules;
 mod settled;
 mod state;
@@ -49,6 +51,7 @@ mod wire;
 
 pub use accounts::{ActivityTimes, WorldCounters};
 pub use change::{Blocked, Next, NotMade};
+pub use checkpoint::CheckpointError;
 pub use control::FIRST_INCARNATION;
 pub use invariants::Violation;
 pub use schedules::{PublishedSchedule, Refused};

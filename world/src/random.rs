@@ -275,7 +275,17 @@ fn check(bench: &Bench, before: &[Point]) -> Result<(), TestCaseError> {
 }
 
 fn run(clearance: bool, slow_grip: bool, acts: &[Act]) -> Result<(Bench, usize), TestCaseError> {
+    run_restored(clearance, slow_grip, acts, None)
+}
+
+fn run_restored(
+    clearance: bool,
+    slow_grip: bool,
+    acts: &[Act],
+    restored_every: Option<u64>,
+) -> Result<(Bench, usize), TestCaseError> {
     let mut bench = Bench::new(scene(clearance, slow_grip));
+    bench.restored_every = restored_every;
     let mut grasps = 0;
     let mut trips = [None; ROBOTS];
     for act in acts {
@@ -331,6 +341,26 @@ proptest! {
         let (one, _) = run(false, true, &acts)?;
         let (other, _) = run(false, true, &acts)?;
         prop_assert_eq!(one.header().state_hash, other.header().state_hash);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    #[test]
+    fn a_world_goes_on_from_its_checkpoint_as_if_nothing_had_been(
+        clearance in any::<bool>(),
+        slow_grip in any::<bool>(),
+        every in 1_u64..60,
+        acts in proptest::collection::vec(act(), 1..60),
+    ) {
+        let (one, _) = run(clearance, slow_grip, &acts)?;
+        let (other, _) = run_restored(clearance, slow_grip, &acts, Some(every))?;
+        prop_assert_eq!(one.header().tick, other.header().tick);
+        prop_assert_eq!(one.header().state_hash, other.header().state_hash);
+        let (mut one, mut other) = (*one.world.counters(), *other.world.counters());
+        (one.swept_tests, other.swept_tests) = (0, 0);
+        prop_assert_eq!(one, other);
     }
 }
 

@@ -96,6 +96,14 @@ impl Leaving {
     pub(crate) fn iter(&self) -> impl Iterator<Item = usize> + '_ {
         self.0.iter().copied().flatten()
     }
+
+    pub(crate) const fn slots(&self) -> [Option<usize>; MAX_LEAVING] {
+        self.0
+    }
+
+    pub(crate) const fn of(slots: [Option<usize>; MAX_LEAVING]) -> Self {
+        Self(slots)
+    }
 }
 
 /// What the newest command of a robot said, and who may send one.

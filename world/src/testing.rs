@@ -61,6 +61,10 @@ pub(crate) struct Bench {
     pub(crate) snapshot: Box<WorldSnapshot>,
     /// Robots whose commands are not sent.
     pub(crate) silent: Vec<bool>,
+    /// After so many ticks each, the world is put away and another one goes on from its
+    /// checkpoint.
+    pub(crate) restored_every: Option<u64>,
+    settings: Settings,
 }
 
 /// The paper's method, all else by default.
@@ -77,12 +81,14 @@ impl Bench {
     }
 
     pub(crate) fn with(scene: Scene, settings: Settings) -> Self {
-        let world = World::new(&scene, settings, 7);
+        let world = World::new(&scene, settings.clone(), 7);
         let mut snapshot: Box<WorldSnapshot> = shm_types::zeroed();
         world.snapshot_into(&mut snapshot);
         let commands: Vec<Command> = (0..scene.counts().robots).map(command).collect();
         Self {
             silent: vec![false; commands.len()],
+            restored_every: None,
+            settings,
             scene,
             world,
             commands,
@@ -141,6 +147,13 @@ impl Bench {
             self.scene = next.scene;
         }
         self.world.snapshot_into(&mut self.snapshot);
+        let tick = self.snapshot.header.tick;
+        if (self.restored_every).is_some_and(|every| tick.is_multiple_of(every)) {
+            let mut bytes = Vec::new();
+            self.world.save(&mut bytes);
+            let restored = World::restore(&self.scene, self.settings.clone(), &bytes);
+            self.world = restored.unwrap();
+        }
     }
 
     pub(crate) fn steps(&mut self, ticks: usize) {

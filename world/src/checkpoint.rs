@@ -1,0 +1,568 @@
+//! The world's whole state as bytes: what a world process that is started again goes on from.
+//!
+//! Responsible for: every field that a later step depends on, in one canonical order, versioned
+//! and with a checksum; refusing what is no sound state of this scene.
+//! Not responsible for: where the bytes are kept (crate `node`).
+//!
+//! What a checkpoint is *of* is not in it: the scene (its hash is), the settings, and all that
+//! follows from these. Counts of exact tests may differ after a restoration, since they depend on
+//! the order in which bodies were put down; nothing else does.
+
+use scene::{Scene, Settings, Vec2};
+use shm_types::{
+    Activity, ConstraintTable, Counts, Failure, FailureCause, Grip, NONE, Outcome, Phase, Refusal,
+    StateHash, TaskStatus, Validate, Verdict, Wait,
+};
+
+use crate::accounts::{ActivityTimes, WorldCounters};
+use crate::epoch::Epoch;
+use crate::invariants::Violation;
+use crate::path::Path;
+use crate::saved::{Reader, Saved, Unreadable, save_bytes, saved, saved_as_bytes, saved_as_code};
+use crate::schedules::{Refused, Schedules};
+use crate::settled::Overflow;
+use crate::state::{Claimed, Hand, Leaving, Link, Object, PendingFailure, Robot};
+use crate::step::World;
+use crate::track::Track;
+
+/// Form of the bytes. Raised whenever it changes.
+const VERSION: u32 = 1;
+/// First bytes of each.
+const MAGIC: [u8; 4] = *b"rrck";
+/// Bytes of the checksum at the end.
+const CHECKSUM: usize = size_of::<u64>();
+/// Ticks and times past this are no run's.
+const MOST: u64 = 1 << 60;
+
+/// Bytes that are no state a world can go on from.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CheckpointError {
+    /// Cut short, or changed since they were written.
+    #[error("its checksum is wrong")]
+    Damaged,
+    /// Written by another version of this program, or of another scene.
+    #[error("it is of another {0}")]
+    Foreign(&'static str),
+    /// No value of its type.
+    #[error("it cannot be read: {0}")]
+    Unreadable(String),
+    /// Values that contradict each other or the scene.
+    #[error("{0} makes no sense")]
+    Unsound(&'static str),
+}
+
+impl From<Unreadable> for CheckpointError {
+    fn from(error: Unreadable) -> Self {
+        Self::Unreadable(error.to_string())
+    }
+}
+
+saved_as_bytes!(Wait, Failure);
+saved_as_code!(Activity, Grip, Outcome, Phase, TaskStatus, Verdict, Refusal);
+
+saved!(Claimed { task, epoch });
+saved!(PendingFailure { report, since_ns });
+saved!(Link {
+    live,
+    incarnation,
+    sequence,
+    valid_until_tick,
+    settled_at_change,
+    go,
+    grip,
+    phase,
+    activity,
+    waits_for,
+});
+saved!(Robot {
+    position,
+    hand,
+    grasp,
+    claim,
+    refused_claim,
+    leaving,
+    link,
+    grant,
+    rest,
+    cut,
+    request,
+    request_tick,
+    actions,
+    action_end,
+    refused,
+    failure,
+    last_failure,
+    epoch_position,
+    epoch_free,
+    activity,
+    times,
+} but {
+    track: Track::still(position),
+    granted_m: 0.0,
+    moved: false,
+    gripped: false,
+});
+saved!(Object {
+    position,
+    rest,
+    goal,
+    kind,
+    holder,
+    claimed_by,
+    status,
+    epoch_status,
+    failures,
+    put_downs,
+    barred,
+    epoch_barred,
+});
+saved!(Epoch {
+    number,
+    events,
+    change,
+    changed_tick,
+    placements,
+    constraints_version,
+    due,
+});
+saved!(Schedules {
+    in_force,
+    judged,
+    refused,
+});
+saved!(Refused {
+    version,
+    tick,
+    why,
+    robot,
+});
+saved!(ActivityTimes { ticks });
+saved!(WorldCounters {
+    grants_refused,
+    invalid_requests,
+    stale_commands,
+    invalid_claims,
+    selection_conflicts,
+    task_failures,
+    constraints_found,
+    answers_missed,
+    grips_refused,
+    violations,
+    schedules_refused,
+    swept_tests,
+});
+
+impl Saved for Hand {
+    fn save(&self, out: &mut Vec<u8>) {
+        match *self {
+            Self::Empty => 0_u32.save(out),
+            Self::Closing { object, ticks } => (1_u32, (object, ticks)).save(out),
+            Self::Holding { object } => (2_u32, object).save(out),
+            Self::Opening { object, ticks } => (3_u32, (object, ticks)).save(out),
+        }
+    }
+
+    fn restore(from: &mut Reader<'_>) -> Result<Self, Unreadable> {
+        Ok(match u32::restore(from)? {
+            0 => Self::Empty,
+            tag @ (1 | 3) => {
+                let (object, ticks) = Saved::restore(from)?;
+                if tag == 1 {
+                    Self::Closing { object, ticks }
+                } else {
+                    Self::Opening { object, ticks }
+                }
+            }
+            2 => Self::Holding {
+                object: Saved::restore(from)?,
+            },
+            other => return Err(Unreadable::Tag(other.into())),
+        })
+    }
+}
+
+impl Saved for Leaving {
+    fn save(&self, out: &mut Vec<u8>) {
+        self.slots().save(out);
+    }
+
+    fn restore(from: &mut Reader<'_>) -> Result<Self, Unreadable> {
+        Ok(Self::of(Saved::restore(from)?))
+    }
+}
+
+impl Saved for Path {
+    fn save(&self, out: &mut Vec<u8>) {
+        self.points().len().save(out);
+        self.points().iter().for_each(|point| point.save(out));
+    }
+
+    fn restore(from: &mut Reader<'_>) -> Result<Self, Unreadable> {
+        let count = usize::restore(from)?;
+        let mut path = Self::EMPTY;
+        for _ in 0..count {
+            if path.is_full() {
+                return Err(Unreadable::Many(count as u64));
+            }
+            path.push(Vec2::restore(from)?);
+        }
+        Ok(path)
+    }
+}
+
+impl Saved for Overflow {
+    fn save(&self, out: &mut Vec<u8>) {
+        match self {
+            Self::Events => 0_u32.save(out),
+            Self::Constraints(dropped) => (1_u32, *dropped).save(out),
+        }
+    }
+
+    fn restore(from: &mut Reader<'_>) -> Result<Self, Unreadable> {
+        match u32::restore(from)? {
+            0 => Ok(Self::Events),
+            1 => Ok(Self::Constraints(u32::restore(from)?)),
+            other => Err(Unreadable::Tag(other.into())),
+        }
+    }
+}
+
+impl Saved for Violation {
+    fn save(&self, out: &mut Vec<u8>) {
+        match *self {
+            Self::Robots { robot, other } => [0, robot, other],
+            Self::Object { robot, object } => [1, robot, object],
+            Self::Wall { robot } => [2, robot, 0],
+            Self::Holding { robot, object } => [3, robot, object],
+            Self::Lost { object } => [4, 0, object],
+            Self::Motion { robot } => [5, robot, 0],
+            Self::Grants { robot, other } => [6, robot, other],
+        }
+        .save(out);
+    }
+
+    fn restore(from: &mut Reader<'_>) -> Result<Self, Unreadable> {
+        let [tag, robot, other] = <[u32; 3]>::restore(from)?;
+        Ok(match tag {
+            0 => Self::Robots { robot, other },
+            1 => Self::Object {
+                robot,
+                object: other,
+            },
+            2 => Self::Wall { robot },
+            3 => Self::Holding {
+                robot,
+                object: other,
+            },
+            4 => Self::Lost { object: other },
+            5 => Self::Motion { robot },
+            6 => Self::Grants { robot, other },
+            _ => return Err(Unreadable::Tag(tag.into())),
+        })
+    }
+}
+
+impl Saved for Box<ConstraintTable> {
+    fn save(&self, out: &mut Vec<u8>) {
+        save_bytes(&[self.version, self.count], out);
+        save_bytes(&[self.effect_tick, self.complete_for_events], out);
+        for constraint in self.constraints() {
+            save_bytes(constraint, out);
+        }
+    }
+
+    fn restore(from: &mut Reader<'_>) -> Result<Self, Unreadable> {
+        let mut table: Self = shm_types::zeroed();
+        let [version, count] = <[u32; 2]>::restore(from)?;
+        let [effect_tick, complete_for_events] = <[u64; 2]>::restore(from)?;
+        (table.version, table.count) = (version, count);
+        (table.effect_tick, table.complete_for_events) = (effect_tick, complete_for_events);
+        let live = table.constraints.get_mut(..count as usize);
+        for constraint in live.ok_or(Unreadable::Many(count.into()))? {
+            *constraint = crate::saved::restore_bytes(from)?;
+        }
+        Ok(table)
+    }
+}
+
+impl World {
+    /// Appends the whole state as it is between two steps to `out`, which needs no more room
+    /// than it had the time before unless the state has grown.
+    pub fn save(&self, out: &mut Vec<u8>) {
+        let begin = out.len();
+        out.extend_from_slice(&MAGIC);
+        let Self {
+            settings,
+            tick,
+            time_ns,
+            tick_m: _,
+            robots,
+            objects,
+            bodies,
+            grants: _,
+            bars,
+            constraints,
+            epoch,
+            schedules,
+            scene_version,
+            verdict,
+            busy,
+            held,
+            stopped,
+            overflow,
+            settled_ticks,
+            outcome,
+            violation,
+            counters,
+            regions: _,
+            wire,
+        } = self;
+        let header = &wire.header;
+        (VERSION, (header.scenario_hash, settings.tick_ns)).save(out);
+        (*tick, *time_ns).save(out);
+        (header.run_id, (header.state_hash, header.generation)).save(out);
+        robots.save(out);
+        objects.save(out);
+        bodies.tests().save(out);
+        for object in 0..objects.len() {
+            bodies.ground.place(object).save(out);
+        }
+        bars.save(out);
+        constraints.save(out);
+        epoch.save(out);
+        schedules.save(out);
+        (*scene_version, (*verdict, (*busy, *settled_ticks))).save(out);
+        ((*held, *stopped), (*overflow, (*outcome, *violation))).save(out);
+        counters.save(out);
+        let checksum = checksum(&out[begin..]);
+        checksum.save(out);
+    }
+
+    /// The world that was saved as `bytes`, in the version of the scene that was in force then.
+    /// All memory that it will ever use is allocated here.
+    ///
+    /// # Errors
+    /// They are no sound state of this scene.
+    pub fn restore(
+        scene: &Scene,
+        settings: Settings,
+        bytes: &[u8],
+    ) -> Result<Self, CheckpointError> {
+        let end = (bytes.len().checked_sub(CHECKSUM)).ok_or(CheckpointError::Damaged)?;
+        let (state, sum) = bytes.split_at(end);
+        if sum != checksum(state).to_le_bytes() {
+            return Err(CheckpointError::Damaged);
+        }
+        let mut from = Reader(state);
+        if from.take(MAGIC.len())? != MAGIC {
+            return Err(CheckpointError::Foreign("program"));
+        }
+        if u32::restore(&mut from)? != VERSION {
+            return Err(CheckpointError::Foreign("version"));
+        }
+        if u64::restore(&mut from)? != scene.hash {
+            return Err(CheckpointError::Foreign("scene"));
+        }
+        if u64::restore(&mut from)? != settings.tick_ns {
+            return Err(CheckpointError::Foreign("length of a tick"));
+        }
+        let mut world = Self::new(scene, settings, 0);
+        world.read(scene, &mut from)?;
+        world.check(scene)?;
+        let state_hash = world.wire.header.state_hash;
+        world.write_wire();
+        world.wire.header.state_hash = state_hash;
+        Ok(world)
+    }
+
+    /// Puts what was saved in the place of the initial state.
+    fn read(&mut self, scene: &Scene, from: &mut Reader<'_>) -> Result<(), CheckpointError> {
+        let (robots, objects) = (self.robots.len(), self.objects.len());
+        (self.tick, self.time_ns) = Saved::restore(from)?;
+        let header = &mut self.wire.header;
+        (header.run_id, (header.state_hash, header.generation)) = Saved::restore(from)?;
+        self.robots = Saved::restore(from)?;
+        self.objects = Saved::restore(from)?;
+        if (self.robots.len(), self.objects.len()) != (robots, objects) {
+            return Err(CheckpointError::Unsound("the number of robots or objects"));
+        }
+        let tests = u64::restore(from)?;
+        let mut places: Vec<Option<Vec2>> = Vec::with_capacity(objects);
+        for _ in 0..objects {
+            places.push(Saved::restore(from)?);
+        }
+        self.bodies = self.bodies.of_version(scene, |object| places[object]);
+        self.bodies.go_on_counting(tests);
+        self.bars.restore(from)?;
+        self.constraints.restore(from)?;
+        self.epoch = Saved::restore(from)?;
+        self.schedules = Saved::restore(from)?;
+        (
+            self.scene_version,
+            (self.verdict, (self.busy, self.settled_ticks)),
+        ) = Saved::restore(from)?;
+        (
+            (self.held, self.stopped),
+            (self.overflow, (self.outcome, self.violation)),
+        ) = Saved::restore(from)?;
+        self.counters = Saved::restore(from)?;
+        if from.0.is_empty() {
+            Ok(())
+        } else {
+            Err(CheckpointError::Unsound("what comes after its end"))
+        }
+    }
+
+    /// Whether every id is that of something there is, and numbers are in range.
+    fn check(&self, scene: &Scene) -> Result<(), CheckpointError> {
+        let (robots, objects) = (self.robots.len(), self.objects.len());
+        let sound = |what: &'static str, holds: bool| {
+            holds.then_some(()).ok_or(CheckpointError::Unsound(what))
+        };
+        let is_object = |object: Option<usize>| object.is_none_or(|object| object < objects);
+        let is_robot = |robot: Option<usize>| robot.is_none_or(|robot| robot < robots);
+        let id_in = |id: u32, count: usize| id == NONE || (id as usize) < count;
+        sound("the tick", self.tick < MOST && self.time_ns < MOST)?;
+        for robot in &self.robots {
+            let object = robot.hand.object();
+            sound("an object in a hand", is_object(object))?;
+            let grasps = object.map_or(1, |object| scene.objects[object].grasps.len());
+            sound("a grasp", robot.grasp < grasps)?;
+            let claim = robot.claim.map(|claim| claim.task);
+            let leaving = robot.leaving.iter().all(|object| object < objects);
+            sound("a claim", is_object(claim) && leaving)?;
+            if let Some(PendingFailure { report, .. }) = &robot.failure {
+                let ids = id_in(report.task, objects) && id_in(report.blocker, robots);
+                let cause = FailureCause::decode(report.cause).is_ok();
+                sound("a failure", ids && cause)?;
+            }
+            let waits_for = robot.link.waits_for.robot;
+            sound("whom a robot waits for", id_in(waits_for, robots))?;
+        }
+        for object in &self.objects {
+            sound("a holder", is_robot(object.holder))?;
+            sound("who has claimed a task", is_robot(object.claimed_by))?;
+        }
+        sound("a bar", self.bars.is_sound(robots, objects))?;
+        let counts = Counts {
+            robots: robots as u32,
+            objects: objects as u32,
+        };
+        let tables = self.constraints.tables();
+        let legal = tables.iter().all(|table| table.validate(counts).is_ok());
+        sound("a constraint", legal)
+    }
+}
+
+fn checksum(bytes: &[u8]) -> u64 {
+    let mut hash = StateHash::new();
+    hash.add(bytes);
+    hash.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{BELOW, Bench, room};
+
+    const OBJECTS: [[[f64; 2]; 2]; 2] = [[[1.0, 1.45], [1.0, 5.0]], [[5.0, 3.0], [5.0, 5.0]]];
+
+    fn bench() -> Bench {
+        let mut bench = Bench::new(room(&[[1.0, 1.0], [3.0, 1.0]], &OBJECTS, BELOW, ""));
+        bench.claim(0, 0);
+        bench.ask(1, &[[8.0, 1.0], [8.0, 3.0]]);
+        bench.steps(3);
+        bench
+    }
+
+    fn saved(bench: &Bench) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        bench.world.save(&mut bytes);
+        bytes
+    }
+
+    fn restore(bench: &Bench, bytes: &[u8]) -> Result<World, CheckpointError> {
+        World::restore(&bench.scene, crate::testing::papers(), bytes)
+    }
+
+    /// With a checksum that fits, so that what lies behind it is looked at.
+    fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
+        let end = bytes.len() - CHECKSUM;
+        let sum = checksum(&bytes[..end]);
+        bytes.truncate(end);
+        sum.save(&mut bytes);
+        bytes
+    }
+
+    #[test]
+    fn what_is_saved_is_restored_to_the_last_bit() {
+        let bench = bench();
+        let bytes = saved(&bench);
+        let world = restore(&bench, &bytes).unwrap();
+        let mut again = Vec::new();
+        world.save(&mut again);
+        assert!(bytes == again);
+        let mut snapshot: Box<shm_types::WorldSnapshot> = shm_types::zeroed();
+        world.snapshot_into(&mut snapshot);
+        assert_eq!(snapshot.header.state_hash, bench.header().state_hash);
+        let mut hashes = [StateHash::new(), StateHash::new()];
+        snapshot.hash_into(&mut hashes[0]);
+        bench.snapshot.hash_into(&mut hashes[1]);
+        assert_eq!(hashes[0].finish(), hashes[1].finish());
+    }
+
+    #[test]
+    fn any_bit_that_is_flipped_is_noticed() {
+        let bench = bench();
+        let bytes = saved(&bench);
+        for at in 0..bytes.len() {
+            let mut other = bytes.clone();
+            other[at] ^= 1 << (at % 8);
+            let error = restore(&bench, &other).err();
+            assert_eq!(error, Some(CheckpointError::Damaged), "{at}");
+        }
+        let short = restore(&bench, &bytes[..bytes.len() - 1]).err();
+        assert_eq!(short, Some(CheckpointError::Damaged));
+    }
+
+    #[test]
+    fn no_bytes_with_a_right_checksum_make_anybody_panic() {
+        let mut bench = bench();
+        let bytes = saved(&bench);
+        let (mut refused, mut taken) = (0, 0);
+        for at in 0..bytes.len() - CHECKSUM {
+            for value in [0, 1, 0x7f, 0xff] {
+                let mut other = bytes.clone();
+                other[at] = value;
+                match restore(&bench, &sealed(other)) {
+                    Err(_) => refused += 1,
+                    Ok(world) => {
+                        taken += 1;
+                        bench.world = world;
+                        bench.step_unsound();
+                    }
+                }
+            }
+        }
+        assert!(refused > 100 && taken > 100, "{refused} and {taken}");
+    }
+
+    #[test]
+    fn another_scene_or_version_is_named() {
+        let bench = bench();
+        let bytes = saved(&bench);
+        let other = room(&[[1.0, 1.0], [3.0, 2.0]], &OBJECTS, BELOW, "");
+        let error = World::restore(&other, crate::testing::papers(), &bytes).err();
+        assert_eq!(error, Some(CheckpointError::Foreign("scene")));
+        let mut newer = bytes.clone();
+        newer[MAGIC.len()] += 1;
+        let error = restore(&bench, &sealed(newer)).err();
+        assert_eq!(error, Some(CheckpointError::Foreign("version")));
+        let slow = Settings {
+            tick_ns: 1,
+            ..crate::testing::papers()
+        };
+        let error = World::restore(&bench.scene, slow, &bytes).err();
+        assert_eq!(error, Some(CheckpointError::Foreign("length of a tick")));
+    }
+}
