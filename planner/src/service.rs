@@ -16,7 +16,7 @@ use scene::{Budget, Method, Scene, Settings};
 use shm_types::capacity::MAX_CONSTRAINTS;
 use shm_types::{
     Checked, ConstraintTable, Counters, HardAnswer, HardRequest, PlannerReport, Schedule,
-    StateHash, Verdict, WorldSnapshot, zeroed,
+    StateHash, TaskStatus, Verdict, WorldSnapshot, zeroed,
 };
 
 use crate::anytime::{Anytime, Standing};
@@ -38,20 +38,26 @@ pub struct PlannerOutput<'a> {
     pub report: PlannerReport,
     /// Answers, to be seen in the next tick.
     pub answers: &'a [HardAnswer],
-    /// A new version of the table, to be seen in the next tick.
+    /// A new version of the table, to be seen in the next tick, or now and then the newest again.
     pub table: Option<&'a ConstraintTable>,
-    /// A new version of the schedule, likewise. Only of methods that plan ahead.
+    /// The same of the schedule. Only of methods that plan ahead.
     pub schedule: Option<&'a Schedule>,
 }
 
 /// Ticks after which a schedule that is not in force was refused.
 const TICKS_TO_ADOPT: u64 = 10;
 
+/// Ticks after which the newest table and schedule are published once more, for those whom they
+/// have not reached.
+const TICKS_TO_REPEAT: u64 = 100;
+
 /// What is being worked on.
 #[derive(Clone, Copy, Debug)]
 enum Job {
     /// The pairs of a failed task.
     Task(HardRequest),
+    /// The same of one that failed before this process began.
+    Again(usize),
     /// All pairs, for the snapshot with this number of events.
     All { events: u64 },
 }
@@ -59,11 +65,15 @@ enum Job {
 /// The planner service.
 pub struct Planner {
     settings: Settings,
+    /// Tick of the newest snapshot seen.
+    tick: u64,
     method: Method,
     tasks: usize,
     hard: HardConstraints,
     /// Requests that wait, oldest first, at most one a robot.
     queue: Vec<HardRequest>,
+    /// Tasks whose constraints an earlier process had found.
+    lost: Vec<usize>,
     job: Option<Job>,
     /// The newest answer to each robot.
     answered: Vec<Option<HardAnswer>>,
@@ -72,6 +82,8 @@ pub struct Planner {
     table: Box<ConstraintTable>,
     /// The table has to be published anew, whatever is found.
     is_stale: bool,
+    /// It has been published as it is.
+    is_published: bool,
     /// Constraints it has no room for.
     dropped: u32,
     /// The schedule of a method that plans ahead, once there is one.
@@ -98,16 +110,19 @@ impl Planner {
         table.complete_for_events = u64::MAX;
         Self {
             settings: settings.clone(),
+            tick: 0,
             method: settings.method,
             tasks,
             hard: HardConstraints::new(scene, &settings),
             queue: Vec::with_capacity(robots),
+            lost: Vec::with_capacity(tasks),
             job: None,
             answered: vec![None; robots],
             // The old answer again, that of a job for the robot's last life, and the new one.
             answers: Vec::with_capacity(3 * robots),
             table,
             is_stale: false,
+            is_published: false,
             dropped: 0,
             schedule: settings.method.plans_ahead().then(zeroed),
             schedule_version: 0,
@@ -131,14 +146,31 @@ impl Planner {
         }
     }
 
-    /// One step: takes in the requests, then works for at most `units`.
+    /// One step: takes in the requests, then works for at most `units`. On a snapshot older than
+    /// the newest seen it does no work.
     pub fn step(&mut self, scene: &Scene, input: PlannerInput, units: u64) -> PlannerOutput<'_> {
         let header = &input.snapshot.header;
+        if header.tick < self.tick {
+            self.answers.clear();
+            for request in input.requests {
+                self.take(*request);
+            }
+            return PlannerOutput {
+                report: self.report(input.snapshot),
+                answers: &self.answers,
+                table: None,
+                schedule: None,
+            };
+        }
+        self.tick = header.tick;
         if header.scene_version != self.scene_version {
             self.enter(scene, input.snapshot);
         }
-        // A planner that was started again goes on where the one before it stopped counting.
-        self.table.version = self.table.version.max(header.constraints_version);
+        if header.constraints_version > self.table.version {
+            // A planner that was started again goes on where the one before it stopped counting.
+            self.table.version = header.constraints_version;
+            self.recover(input.snapshot);
+        }
         self.answers.clear();
         for request in input.requests {
             self.take(*request);
@@ -158,11 +190,15 @@ impl Planner {
             self.answered[answer.robot as usize] = Some(*answer);
             self.journal.add(answer);
         }
+        let is_due = header.tick.is_multiple_of(TICKS_TO_REPEAT);
+        let repeat_table = is_due && self.is_published;
+        let repeat_schedule = is_due && self.schedule_version > 0;
+        self.is_published |= publish;
         PlannerOutput {
             report: self.report(input.snapshot),
             answers: &self.answers,
-            table: publish.then_some(&*self.table),
-            schedule: self.schedule.as_deref().filter(|_| reschedule),
+            table: (publish || repeat_table).then_some(&*self.table),
+            schedule: (self.schedule.as_deref()).filter(|_| reschedule || repeat_schedule),
         }
     }
 
@@ -172,8 +208,7 @@ impl Planner {
         &self.table
     }
 
-    /// Goes on planning ahead. Whether a schedule is to be published: it is numbered and dated. A
-    /// planner that was started again leaves the robots with the schedule that is in force.
+    /// Goes on planning ahead. Whether a schedule is to be published: it is numbered and dated.
     fn plan_ahead(
         &mut self,
         scene: &Scene,
@@ -187,9 +222,9 @@ impl Planner {
         let in_force = header.schedule_version;
         let is_due = match &mut self.anytime {
             None => self.standing == Standing::Written && in_force == 0,
-            // One that was started again knows nothing of what robots follow.
+            // One that was started again knows nothing of what robots follow, and leaves them to it.
             Some(anytime) if self.schedule_version == 0 && in_force > 0 => {
-                anytime.replan(snapshot);
+                anytime.inherit();
                 let counters = &mut self.counters;
                 self.standing = anytime.advance(scene, snapshot, budget, counters, schedule);
                 self.standing == Standing::Written
@@ -232,6 +267,7 @@ impl Planner {
             schedule: self.schedule.take(),
             schedule_version: self.schedule_version,
             scene_version: snapshot.header.scene_version,
+            tick: self.tick,
             anytime: self.anytime.take(),
             standing: self.standing,
             counters: self.counters,
@@ -243,6 +279,20 @@ impl Planner {
         if let Some(anytime) = &mut self.anytime {
             anytime.replan(snapshot);
         }
+    }
+
+    /// Begins to find again what an earlier process of the planner had found, of the tasks that have
+    /// failed since. Who starts now cannot get its table, and waits: so there is another in any
+    /// case.
+    fn recover(&mut self, snapshot: Checked<WorldSnapshot>) {
+        let objects = snapshot.objects().iter().enumerate();
+        let open = objects.filter(|(_, object)| object.status != TaskStatus::Done.code());
+        let failed = open.filter(|(_, object)| object.failures > 0);
+        self.lost.clear();
+        if self.method.restricts() {
+            self.lost.extend(failed.map(|(task, _)| task));
+        }
+        self.is_stale = self.lost.is_empty() && !self.method.plans_ahead();
     }
 
     /// Takes a request in: into the queue, unless it is there, was answered, or makes no sense.
@@ -327,6 +377,10 @@ impl Planner {
             self.hard.begin_all();
             return Some(Job::All { events });
         }
+        if let Some(task) = self.lost.pop() {
+            self.hard.begin_task(scene, task);
+            return Some(Job::Again(task));
+        }
         if self.queue.is_empty() {
             return None;
         }
@@ -352,6 +406,7 @@ impl Planner {
                 self.table.complete_for_events = events;
                 true
             }
+            Job::Again(_) => self.lost.is_empty(),
             Job::Task(request) => {
                 self.answers.push(HardAnswer {
                     robot: request.robot,
@@ -395,13 +450,14 @@ impl Planner {
         let outstanding =
             self.method == Method::All && self.table.complete_for_events != snapshot.header.events;
         PlannerReport {
-            tick: snapshot.header.tick,
+            tick: self.tick,
             state_hash: self.state_hash(),
             constraints_version: self.table.version,
             schedule_version: self.schedule_version,
             busy: u32::from(
                 self.job.is_some()
                     || !self.queue.is_empty()
+                    || !self.lost.is_empty()
                     || outstanding
                     || self.standing == Standing::Busy,
             ),
@@ -423,6 +479,7 @@ impl Planner {
         match self.job {
             None => {}
             Some(Job::Task(request)) => hash.add(&request),
+            Some(Job::Again(task)) => hash.add(&(task as u64)),
             Some(Job::All { events }) => hash.add(&events),
         }
         hash.add(&self.counters);

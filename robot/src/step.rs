@@ -36,6 +36,8 @@ pub struct RobotInput<'a> {
 pub struct Robot {
     id: usize,
     incarnation: u32,
+    /// Tick of the newest snapshot seen.
+    tick: u64,
     command_valid_ticks: u64,
     mind: Mind,
     intent: Intent,
@@ -64,6 +66,7 @@ impl Robot {
         Self {
             id,
             incarnation,
+            tick: 0,
             command_valid_ticks: settings.command_valid_ticks,
             mind: if settings.method.plans_ahead() {
                 Mind::Follows(Follower::new(&settings))
@@ -101,7 +104,8 @@ impl Robot {
     }
 
     /// Answers one snapshot, within `units` of work. Writes the whole command, and returns what
-    /// is to be asked of the planner.
+    /// is to be asked of the planner. To one that is older than the newest seen there is nothing
+    /// to say: the command stays as it was.
     pub fn step(
         &mut self,
         scene: &Scene,
@@ -109,6 +113,10 @@ impl Robot {
         units: u64,
         out: &mut Command,
     ) -> Option<HardRequest> {
+        if input.snapshot.header.tick < self.tick {
+            return None;
+        }
+        self.tick = input.snapshot.header.tick;
         let now = Now {
             scene,
             snapshot: input.snapshot,

@@ -97,6 +97,7 @@ saved!(Robot {
     activity,
     times,
 } but {
+    drive: 1.0,
     track: Track::still(position),
     granted_m: 0.0,
     moved: false,

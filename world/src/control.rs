@@ -48,11 +48,14 @@ impl World {
         let link = &robot.link;
         match kind {
             ControlKind::Down if !link.live => Some(format!("robot {index} is gone already")),
+            // Of a process that is no more: it may have been told late.
+            ControlKind::Down | ControlKind::Up
+                if (1..link.incarnation).contains(&request.incarnation) =>
+            {
+                Some(format!("a later process of robot {index} takes part"))
+            }
             ControlKind::Up if request.incarnation == 0 && link.live => {
                 Some(format!("robot {index} takes part already"))
-            }
-            ControlKind::Up if (1..link.incarnation).contains(&request.incarnation) => {
-                Some(format!("a later process of robot {index} takes part"))
             }
             _ => None,
         }
@@ -156,6 +159,19 @@ mod tests {
 
     fn bench(more: &str) -> Bench {
         Bench::new(room(&[[1.0, 1.0], [1.0, 0.5]], &OBJECTS, BELOW, more))
+    }
+
+    #[test]
+    fn word_of_a_process_that_is_no_more_changes_nothing() {
+        let mut bench = bench("");
+        bench.tell(ControlKind::Up, 0, 2);
+        bench.step();
+        bench.tell(ControlKind::Down, 0, 1);
+        bench.step();
+        assert_eq!((bench.robot(0).live, bench.robot(0).incarnation), (1, 2));
+        bench.tell(ControlKind::Down, 0, 2);
+        bench.step();
+        assert_eq!(bench.robot(0).live, 0);
     }
 
     #[test]

@@ -152,7 +152,8 @@ impl Grants {
             && has_room(&robots[i])
         {
             let track = robots[i].track;
-            let left_m = self.tick_m - track.moved_m();
+            let tick_m = self.tick_m * robots[i].drive;
+            let left_m = tick_m - track.moved_m();
             let at_grant_end = track.used() == robots[i].grant.points().len();
             if !at_grant_end || track.is_full() || left_m <= ARRIVAL_M {
                 break;
@@ -171,7 +172,7 @@ impl Grants {
             };
             self.grant(around, &mut robots[i], i, end, whole);
             let robot = &mut robots[i];
-            robot.track = Track::walk(robot.position, &robot.grant, self.tick_m);
+            robot.track = Track::walk(robot.position, &robot.grant, tick_m);
             extended = true;
             if !whole {
                 break;
@@ -228,7 +229,7 @@ fn moves(robot: &Robot, tick: u64) -> bool {
 
 fn set_out(robot: &Robot, tick: u64, tick_m: f64) -> Track {
     if moves(robot, tick) {
-        Track::walk(robot.position, &robot.grant, tick_m)
+        Track::walk(robot.position, &robot.grant, tick_m * robot.drive)
     } else {
         Track::still(robot.position)
     }

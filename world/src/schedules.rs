@@ -305,6 +305,31 @@ mod tests {
         assert_eq!(bench.world.counters().invalid_requests, 0);
     }
 
+    /// What comes after a stop begins where the robot stands, also if an earlier process of it was
+    /// granted part of an action and left it there.
+    #[test]
+    fn a_robot_left_between_the_ends_of_actions_can_be_planned_for() {
+        let mut bench = scheduled();
+        // Robot 1 is in the way, so that the last action is granted in part.
+        let far = [[2.0, 1.0], [9.0, 1.0]];
+        ask(&mut bench, &far);
+        bench.steps(600);
+        let cut = bench.robot(0);
+        assert_eq!((cut.actions, cut.request_open), (1, 1));
+        bench.tell(ControlKind::Up, 0, 2);
+        bench.step();
+        let mut stop = schedule(2, 1, &[]);
+        stop.robots[0].complete = 0;
+        bench.schedule = Some(stop);
+        bench.steps(2);
+        assert_eq!(bench.header().schedule_version, 2);
+        let here = bench.at(0);
+        bench.schedule = Some(schedule(3, 0, &[here, [3.0, 2.0]]));
+        bench.steps(2);
+        assert_eq!(bench.world.refused_schedule(), None);
+        assert_eq!(bench.header().schedule_version, 3);
+    }
+
     #[test]
     fn a_schedule_that_does_not_go_on_from_what_is_granted_is_refused_once() {
         let plans = [

@@ -19,6 +19,11 @@ use crate::step::World;
 /// in which nothing came of it.
 const SETTLED_TICKS: u32 = 2;
 
+/// World time for which everyone must be settled if the planner plans ahead and has not said that
+/// it knows no plan, ns: it gets the time to see that its plan cannot be followed, and to make
+/// another.
+const SETTLED_WITH_PLAN_NS: u64 = 5_000_000_000;
+
 /// Robots or objects that a reason lists one by one.
 const MOST_LISTED: usize = 20;
 
@@ -157,12 +162,21 @@ impl World {
             Outcome::Solved
         } else if self.stopped {
             Outcome::Interrupted
-        } else if self.settled_ticks >= SETTLED_TICKS {
+        } else if self.settled_ticks >= self.ticks_to_settle() {
             Outcome::Stuck
         } else if self.time_ns + self.settings.tick_ns >= self.settings.time_limit_ns {
             Outcome::Timeout
         } else {
             Outcome::Running
+        }
+    }
+
+    fn ticks_to_settle(&self) -> u32 {
+        if self.settings.method.plans_ahead() && self.verdict == Verdict::Open {
+            let ticks = SETTLED_WITH_PLAN_NS.div_ceil(self.settings.tick_ns.max(1));
+            u32::try_from(ticks).map_or(u32::MAX, |ticks| ticks.max(SETTLED_TICKS))
+        } else {
+            SETTLED_TICKS
         }
     }
 
@@ -195,6 +209,8 @@ impl World {
                 r.link.is_fresh(self.tick)
                     && looked(r.link.settled_at_change)
                     && !r.hand.is_moving()
+                    // What is granted is driven yet, however slowly.
+                    && r.grant.is_empty()
                     && r.failure.is_none()
             })
     }

@@ -168,6 +168,8 @@ pub(crate) struct Robot {
     pub(crate) link: Link,
     /// Path granted and still ahead.
     pub(crate) grant: Path,
+    /// Share of its full speed that its drive gives it; less than 1 only in simulated faults.
+    pub(crate) drive: f64,
     /// Path asked for and not granted.
     pub(crate) rest: Path,
     /// The last granted point lies on the way to `rest`'s first.
@@ -210,6 +212,7 @@ impl Robot {
             leaving: Leaving::default(),
             link: Link::new(FIRST_INCARNATION),
             grant: Path::EMPTY,
+            drive: 1.0,
             rest: Path::EMPTY,
             cut: false,
             request: 0,
@@ -278,12 +281,10 @@ impl Robot {
         self.drop_rest();
     }
 
-    /// Keeps the path granted to its end, wherever that is, and drops all else.
+    /// Keeps the path granted to its end, wherever that is, and drops all else. What comes next
+    /// begins there: also where an earlier process left the robot between the ends of actions.
     pub(crate) fn keep_path(&mut self) {
-        if self.cut {
-            let end = self.grant.points().last().copied();
-            self.action_end = Some(end.unwrap_or(self.position));
-        }
+        self.action_end = Some(self.grant_end());
         self.drop_rest();
     }
 

@@ -258,6 +258,21 @@ impl World {
         self.overflow = self.overflow.or(events).or(constraints);
     }
 
+    /// From the next step on `robot` moves with this share of its speed, from 0 to 1: for
+    /// simulated faults. The robots of a run move as they should.
+    ///
+    /// # Panics
+    /// When there is no such robot.
+    pub fn set_drive(&mut self, robot: usize, share: f64) {
+        self.robots[robot].drive = share.clamp(0.0, 1.0);
+    }
+
+    /// Number of the newest snapshot.
+    #[must_use]
+    pub const fn tick(&self) -> u64 {
+        self.tick
+    }
+
     /// How the run stands.
     #[must_use]
     pub const fn outcome(&self) -> Outcome {

@@ -53,6 +53,10 @@ const MOST_S: u64 = 60;
 const ATTEMPTS_BEFORE_SEARCH: u64 = 3;
 /// Ticks for which nothing may change before it counts as standing still.
 const TICKS_TO_SETTLE: u64 = 20;
+/// World time for which nothing may change while a plan for all objects is not carried out before
+/// it counts as one that robots cannot follow, ns: some process did something else than it says.
+/// Each time it comes to that it is doubled.
+const DOUBT_NS: u64 = 2_000_000_000;
 /// One configuration of the complete search, in work units.
 const UNITS_PER_CONFIGURATION: u64 = 40;
 /// One safe interval expanded, in work units.
@@ -61,6 +65,8 @@ const UNITS_PER_INTERVAL: u64 = 12;
 /// What comes next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
+    /// Robots follow a plan that an earlier process of the planner made.
+    Inherited,
     /// Robots are to go no further than is granted to them, since something has changed.
     Stop,
     /// They stand still, if nothing changes until this tick, as of this number of changes.
@@ -121,6 +127,10 @@ pub(crate) struct Anytime {
     replaced: Option<Script>,
     /// When robots began to follow, ns.
     begun_ns: Option<u64>,
+    /// The newest number of changes seen, and since when, ns.
+    quiet: (u64, u64),
+    /// For how long that may go on, ns.
+    doubt_ns: u64,
     /// Cells expanded and ways looked for in all.
     cells: u64,
     ways: u64,
@@ -141,6 +151,8 @@ impl Anytime {
             script: None,
             replaced: None,
             begun_ns: None,
+            quiet: (0, 0),
+            doubt_ns: DOUBT_NS,
             cells: 0,
             ways: 0,
         }
@@ -156,13 +168,16 @@ impl Anytime {
         counters: &mut Counters,
         out: &mut Schedule,
     ) -> Standing {
-        if self.is_other_team(snapshot.robots()) {
+        if self.is_other_team(snapshot.robots()) || self.is_doubtful(snapshot) {
             self.replan(snapshot);
         }
         loop {
             let paid = self.debt.min(budget.left());
             budget.spend(paid);
             self.debt -= paid;
+            if self.stage == Stage::Inherited {
+                return Standing::Idle(Verdict::Open);
+            }
             if let Stage::Done(verdict) = self.stage {
                 let is_open = verdict == Verdict::Open;
                 return Standing::Idle(if is_open { self.verdict } else { verdict });
@@ -222,6 +237,14 @@ impl Anytime {
         };
     }
 
+    /// An earlier process made the plan that robots follow, which this one knows nothing of: it
+    /// leaves them to it, and plans anew once they stand still.
+    pub(crate) fn inherit(&mut self) {
+        if self.stage == Stage::New && self.script.is_none() {
+            self.stage = Stage::Inherited;
+        }
+    }
+
     /// Whether other robots take part than did when this was asked last.
     fn is_other_team(&mut self, robots: &[RobotState]) -> bool {
         let is_same = (self.team.iter()).eq(robots.iter().map(|robot| &robot.live));
@@ -231,6 +254,26 @@ impl Anytime {
             self.team.extend(robots.iter().map(|robot| robot.live));
         }
         !is_same && !is_first
+    }
+
+    /// Whether robots stand still although they have a plan that brings all objects to their goals.
+    fn is_doubtful(&mut self, snapshot: Checked<WorldSnapshot>) -> bool {
+        let header = &snapshot.header;
+        let follows = matches!(
+            self.stage,
+            Stage::Inherited | Stage::Follow(_) | Stage::Round(..) | Stage::Done(Verdict::Open)
+        );
+        let is_on_its_way =
+            header.change != self.quiet.0 || header.held == 1 || !stands_still(&snapshot);
+        if !follows || self.verdict != Verdict::Open || is_on_its_way {
+            self.quiet = (header.change, header.time_ns);
+            return false;
+        }
+        if header.time_ns < self.quiet.1 + self.doubt_ns {
+            return false;
+        }
+        self.doubt_ns = self.doubt_ns.saturating_mul(2);
+        true
     }
 
     /// Lists nothing: robots go no further than is granted to them.
@@ -389,7 +432,9 @@ impl Anytime {
                     Stage::Done(Verdict::Open)
                 }
             }
-            Stage::Stop | Stage::Settle(..) | Stage::New | Stage::Done(_) => self.stage,
+            Stage::Inherited | Stage::Stop | Stage::Settle(..) | Stage::New | Stage::Done(_) => {
+                self.stage
+            }
         };
         is_written
     }
