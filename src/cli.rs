@@ -56,6 +56,8 @@ pub(crate) enum Command {
     List(ListArgs),
     /// Tell a live run that something has changed: a goal, an object, a wall, a robot
     Tell(TellArgs),
+    /// Run scenarios in which processes die, messages are lost and robots slip, seed by seed
+    Simulate(SimulateArgs),
     /// Measure how fast this machine runs a scenario
     Bench(BenchArgs),
     /// Role: the process that owns the state of all bodies
@@ -107,6 +109,51 @@ pub(crate) struct RoleArgs {
 }
 
 const MAX_ROBOTS: i64 = shm_types::capacity::MAX_ROBOTS as i64;
+
+#[derive(Debug, Args)]
+#[command(after_help = format!("\
+Everything runs in this process, on all cores. A seed stands for a room, a method and a plan of
+faults, and fails in the same way whenever it is run. docs/simulate.md says what can go wrong and
+what must hold all the same.
+
+Examples:
+  rearrange simulate --seeds 1000
+  rearrange simulate --seeds 200 --method anytime room.toml other.toml
+  rearrange simulate --seeds 1 --first-seed 4711 --shrink
+
+{STATUSES}"))]
+pub(crate) struct SimulateArgs {
+    /// Scenario files, or names of built-in scenarios, in turn [default: seeded random rooms]
+    #[arg(value_name = "SCENARIO")]
+    pub(crate) scenarios: Vec<String>,
+    /// How many seeds to run
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    pub(crate) seeds: u64,
+    /// The first of them
+    #[arg(long, value_name = "K", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=1_000_000_000_000))]
+    pub(crate) first_seed: u64,
+    /// Make each seed that fails small: fewer faults, robots and objects
+    #[arg(long)]
+    pub(crate) shrink: bool,
+    /// The method of all runs [default: the seed says]
+    #[arg(long, value_parser = crate::run_options::named::<scene::Method>(&crate::run_options::METHODS))]
+    pub(crate) method: Option<scene::Method>,
+    /// Take only the first M robots
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=MAX_ROBOTS))]
+    pub(crate) robots: Option<u32>,
+    /// Take only the first N objects
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MAX_OBJECTS))]
+    pub(crate) objects: Option<u32>,
+    /// Let only the faults of these numbers happen, as `--shrink` prints them
+    #[arg(long, value_name = "NUMBERS")]
+    pub(crate) only: Option<sim::faults::Numbers>,
+    /// Seeds that are run at the same time [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_024))]
+    pub(crate) threads: Option<u32>,
+    /// Print the totals as one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
+}
 
 #[derive(Debug, Args)]
 #[command(after_help = format!("Example:\n  rearrange run --trace run.mcap && rearrange check run.mcap\n\n{STATUSES}"))]

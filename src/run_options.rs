@@ -262,7 +262,7 @@ pub(crate) fn wait() -> impl TypedValueParser<Value = Wait> {
 }
 
 /// A parser of one of `names` into the value that serde knows by it.
-fn named<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+pub(crate) fn named<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
 where
     T: DeserializeOwned + Clone + Send + Sync + 'static,
 {

@@ -2,7 +2,7 @@
 //!
 //! Responsible for: the order of things within a tick, what is seen when, and one report at the
 //! end. It is the reference for the other drivers: a lockstep run of real processes has the same
-//! hash at every tick.
+//! hash at every tick. And for the same with faults between the machines ([`faults`]).
 //! Not responsible for: what the machines decide, traces, clocks, printing.
 //!
 //! Terms: a message is *staged* from the step that sends it to the step that sees it.
@@ -12,6 +12,7 @@
 //! world takes the commands of tick k, in robot order, and makes snapshot k+1.
 #![forbid(unsafe_code)]
 
+pub mod faults;
 mod report;
 mod simulation;
 mod tables;

@@ -387,7 +387,7 @@ impl<'s> Simulation<'s> {
 }
 
 /// A message made by a machine of this process.
-fn checked<T: Validate>(message: &T, counts: Counts) -> Checked<'_, T> {
+pub(crate) fn checked<T: Validate>(message: &T, counts: Counts) -> Checked<'_, T> {
     Checked::new(message, counts).unwrap_or_else(|invalid| bug(invalid))
 }
 

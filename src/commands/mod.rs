@@ -12,6 +12,7 @@ mod roles;
 mod run;
 mod scenarios;
 mod schema;
+mod simulate;
 mod still;
 mod tell;
 mod validate;
@@ -51,6 +52,7 @@ fn dispatch(command: Command) -> Outcome {
         Command::Scenarios(args) => scenarios::main(&args),
         Command::List(args) => list::main(&args),
         Command::Tell(args) => tell::main(&args),
+        Command::Simulate(args) => simulate::main(&args),
         Command::Bench(args) => bench::main(&args.workload),
         Command::World(args) => roles::main(node::Role::World, &args),
         Command::Planner(args) => roles::main(node::Role::Planner, &args),
