@@ -6,6 +6,7 @@
 use shm_types::Outcome;
 use sim::Simulation;
 use sim::faults::{Cut, Disturbed, Fault, Finding, Kind, Trial};
+use world::Guard;
 
 fn trial(seed: u64) -> Trial {
     Trial::random(seed, Cut::default(), None).unwrap()
@@ -80,5 +81,28 @@ fn seeds_that_once_failed_pass() {
         let trial = trial(seed);
         let finding = trial.run(trial.plan(), &mut ()).finding;
         assert_eq!(finding, None, "{seed}");
+    }
+}
+
+/// Seeds within which the loss of any one check is found.
+const SEEDS_TO_BITE: u64 = 8;
+
+/// The campaign that all seeds pass bites: a world that does without any one of its checks does not
+/// pass it.
+#[test]
+fn a_world_that_does_without_a_check_is_found_out() {
+    for guard in Guard::ALL {
+        let found = (0..SEEDS_TO_BITE).find_map(|seed| {
+            let trial = Trial::random(seed, Cut::default(), None)?;
+            let finding = trial
+                .run_without(trial.plan(), &mut (), Some(guard))
+                .finding;
+            let found = finding.filter(|finding| matches!(finding, Finding::Unsafe(_)))?;
+            Some((seed, found))
+        });
+        let Some((seed, found)) = found else {
+            panic!("{guard:?} is not missed within {SEEDS_TO_BITE} seeds");
+        };
+        println!("without {guard:?}: seed {seed}, {found}");
     }
 }

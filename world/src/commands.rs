@@ -6,6 +6,7 @@
 use scene::Scene;
 use shm_types::{Activity, Checked, Command, ConstraintTable, Grip, Phase};
 
+use crate::guards::Guard;
 use crate::journal::Journal;
 use crate::requests::{self, InForce};
 use crate::step::{World, WorldInput};
@@ -25,10 +26,12 @@ impl World {
                 continue;
             };
             let link = &self.robots[i].link;
+            let of_this = command.incarnation == link.incarnation;
+            let newer = command.sequence > link.sequence;
             let new = link.live
                 && command.robot as usize == i
-                && command.incarnation == link.incarnation
-                && command.sequence > link.sequence;
+                && self.guards.holds(Guard::Incarnation, of_this)
+                && self.guards.holds(Guard::Sequence, newer);
             if new {
                 self.take_intent(i, command);
                 self.take_claim(i, command.claim, known, journal);
@@ -43,9 +46,14 @@ impl World {
     }
 
     fn take_intent(&mut self, i: usize, command: &Command) {
+        let forever = self.guards.holds(Guard::Validity, false);
         let link = &mut self.robots[i].link;
         link.sequence = command.sequence;
-        link.valid_until_tick = command.valid_until_tick;
+        link.valid_until_tick = if forever {
+            u64::MAX
+        } else {
+            command.valid_until_tick
+        };
         link.settled_at_change = command.settled_at_change;
         link.go = command.go == 1;
         // Checked messages hold only codes that decode.
@@ -57,6 +65,7 @@ impl World {
 
     fn take_request(&mut self, scene: &Scene, i: usize, command: &Command) {
         let in_force = InForce {
+            guards: self.guards,
             tick: self.tick,
             schedule_version: self.schedules.in_force,
         };

@@ -10,6 +10,7 @@ use scene::{Scene, Vec2};
 
 use crate::bodies::{Bodies, Sweep};
 use crate::broad::Aabb;
+use crate::guards::{Guard, Guards};
 use crate::path::ARRIVAL_M;
 use crate::state::Robot;
 
@@ -35,6 +36,7 @@ pub(crate) struct Farthest {
 pub(crate) struct Field<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) bodies: &'a Bodies,
+    pub(crate) guards: Guards,
     pub(crate) robots: &'a [Robot],
     /// Box of each robot's region.
     pub(crate) regions: &'a [Aabb],
@@ -94,7 +96,8 @@ impl Field<'_> {
     ) -> Result<(), Refusal> {
         let swept = self.bodies.region(sweep, true);
         for (j, region) in self.regions.iter().enumerate() {
-            if j != i && swept.meets(region) && meets(&self.robots[j]) {
+            let is_met = j != i && swept.meets(region) && meets(&self.robots[j]);
+            if !self.guards.holds(Guard::Grants, !is_met) {
                 return Err(Refusal::Robot(j));
             }
         }

@@ -22,6 +22,7 @@ use scene::{Scene, Vec2};
 use crate::bodies::{Bodies, Sweep};
 use crate::broad::Aabb;
 use crate::extension::{Field, Refusal, farthest};
+use crate::guards::Guards;
 use crate::path::ARRIVAL_M;
 use crate::state::Robot;
 use crate::track::Track;
@@ -48,6 +49,7 @@ pub(crate) struct Grants {
 pub(crate) struct Surroundings<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) bodies: &'a Bodies,
+    pub(crate) guards: Guards,
 }
 
 impl Grants {
@@ -211,6 +213,7 @@ impl Grants {
         Field {
             scene: around.scene,
             bodies: around.bodies,
+            guards: around.guards,
             robots,
             regions: &self.regions,
         }

@@ -12,6 +12,7 @@ use shm_types::{EventKind, Grip, TaskStatus};
 
 use crate::bodies::Sweep;
 use crate::broad::Aabb;
+use crate::guards::Guard;
 use crate::journal::{Event, Journal};
 use crate::state::{Hand, Robot};
 use crate::step::World;
@@ -43,7 +44,8 @@ impl World {
     /// current epoch, with nobody else in the place of what it will then carry.
     fn graspable(&self, scene: &Scene, i: usize) -> Option<(usize, usize)> {
         let robot = &self.robots[i];
-        let claim = robot.claim.filter(|c| c.epoch == self.epoch.number)?;
+        let is_present = |epoch| self.guards.holds(Guard::Epoch, epoch == self.epoch.number);
+        let claim = robot.claim.filter(|c| is_present(c.epoch))?;
         let place = self.bodies.ground.place(claim.task)?;
         let grasp = scene.grasp_by(claim.task, robot.position - place)?;
         let class = scene.objects[claim.task].grasps[grasp].class;

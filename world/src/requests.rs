@@ -9,12 +9,14 @@ use scene::{Scene, Vec2};
 use shm_types::PathRequest;
 
 use crate::bodies::{Bodies, Sweep};
+use crate::guards::{Guard, Guards};
 use crate::path::{ARRIVAL_M, Path};
 use crate::state::{Robot, is_at};
 
 /// What a request is held against.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct InForce {
+    pub(crate) guards: Guards,
     /// The present tick.
     pub(crate) tick: u64,
     /// Version of the schedule; 0 for none.
@@ -30,7 +32,8 @@ pub(crate) fn take(
     request: &PathRequest,
     in_force: InForce,
 ) -> bool {
-    if request.id <= robot.request || robot.hand.is_moving() {
+    let newer = request.id > robot.request;
+    if !in_force.guards.holds(Guard::Request, newer) || robot.hand.is_moving() {
         return true;
     }
     robot.request = request.id;

@@ -17,6 +17,7 @@ use crate::change::Next;
 use crate::constraints::Constraints;
 use crate::epoch::Epoch;
 use crate::grants::{Grants, Surroundings};
+use crate::guards::Guards;
 use crate::invariants::Violation;
 use crate::journal::{Event, Journal};
 use crate::motion::{self, Span};
@@ -56,6 +57,8 @@ pub struct World {
     pub(crate) objects: Vec<Object>,
     pub(crate) bodies: Bodies,
     pub(crate) grants: Grants,
+    /// The checks that are made: all of them.
+    pub(crate) guards: Guards,
     pub(crate) bars: Bars,
     pub(crate) constraints: Constraints,
     pub(crate) epoch: Epoch,
@@ -103,6 +106,7 @@ impl World {
             tick_m,
             bodies: Bodies::new(scene),
             grants: Grants::new(robots.len(), tick_m),
+            guards: Guards::default(),
             bars: Bars::new(robots.len(), objects.len()),
             constraints: Constraints::none(),
             epoch: Epoch::first(),
@@ -195,6 +199,7 @@ impl World {
             let around = Surroundings {
                 scene,
                 bodies: &self.bodies,
+                guards: self.guards,
             };
             self.counters.grants_refused += self.grants.extend(around, &mut self.robots, self.tick);
             let span = Span {

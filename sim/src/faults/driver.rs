@@ -18,7 +18,7 @@ use shm_types::{
     ConstraintTable, ControlKind, ControlRequest, MotionBatch, RoleKind, TaskStatus, WorldSnapshot,
     zeroed,
 };
-use world::{FIRST_INCARNATION, World};
+use world::{FIRST_INCARNATION, Guard, World};
 
 use super::active::Active;
 use super::fault::{Channel, Fault, Kind, Whom};
@@ -44,6 +44,8 @@ pub struct Disturbed<'s> {
     pub(crate) motion: Box<MotionBatch>,
     pub(crate) empty: Box<ConstraintTable>,
     control_id: u64,
+    /// The check that the world does without, in tests.
+    pub(crate) guard: Option<Guard>,
     pub(crate) watch: Watch,
 }
 
@@ -55,9 +57,28 @@ impl<'s> Disturbed<'s> {
         Self::with_world(scene, settings, plan, until, world)
     }
 
-    /// As [`Self::new`], with a world of the caller's, at tick 0.
+    /// As [`Self::new`], in a world that makes all its checks but this one.
     #[must_use]
-    pub fn with_world(
+    pub fn without(
+        scene: &'s Scene,
+        settings: &Settings,
+        plan: Vec<Fault>,
+        until: u64,
+        guard: Option<Guard>,
+    ) -> Self {
+        let world = World::new(scene, settings.clone(), 0);
+        let world = match guard {
+            None => world,
+            Some(guard) => world.without(guard),
+        };
+        Self {
+            guard,
+            ..Self::with_world(scene, settings, plan, until, world)
+        }
+    }
+
+    /// As [`Self::new`], with a world of the caller's.
+    fn with_world(
         scene: &'s Scene,
         settings: &Settings,
         plan: Vec<Fault>,
@@ -79,6 +100,7 @@ impl<'s> Disturbed<'s> {
             motion: zeroed(),
             empty: ConstraintTable::none(),
             control_id: 0,
+            guard: None,
             scene,
             settings: settings.clone(),
             world,

@@ -8,7 +8,7 @@ use std::rc::Rc;
 use rand::RngExt;
 use shm_types::capacity::MAX_ROBOTS;
 use shm_types::{Command, WorldSnapshot, zeroed};
-use world::{World, WorldInput};
+use world::{CheckpointError, World, WorldInput};
 
 use super::active::Active;
 use super::driver::Disturbed;
@@ -32,19 +32,21 @@ impl Disturbed<'_> {
         let is_torn = crash.share % 2 == 0;
         let mut newest = Vec::new();
         self.world.save(&mut newest);
+        let whole = newest.clone();
         if is_torn {
-            let whole = newest.len();
-            newest.truncate(self.rng.random_range(0..whole));
-            newest.resize(whole, 0);
+            newest.truncate(self.rng.random_range(0..whole.len()));
+            newest.resize(whole.len(), 0);
         }
-        let (scene, settings) = (self.scene, &self.settings);
-        let restored = World::restore(scene, settings.clone(), &newest);
-        match restored {
+        let is_damaged = is_torn && newest != whole;
+        match self.restore(&newest) {
+            Ok(_) if is_damaged => self
+                .watch
+                .find(now, "the world goes on from half a journal"),
             Ok(world) if world.state_hash() == state_hash => self.world = world,
             Ok(_) => self
                 .watch
                 .find(now, "the world goes on from what it never was"),
-            Err(_) if is_torn => match World::restore(scene, settings.clone(), &journal) {
+            Err(_) if is_torn => match self.restore(&journal) {
                 Ok(world) => {
                     self.world = world;
                     self.forget_heard();
@@ -58,6 +60,14 @@ impl Disturbed<'_> {
         }
         self.publish();
         self.forget_heard();
+    }
+
+    fn restore(&self, journal: &[u8]) -> Result<World, CheckpointError> {
+        let (scene, settings) = (self.scene, self.settings.clone());
+        match self.guard {
+            None => World::restore(scene, settings, journal),
+            Some(guard) => World::restore_without(scene, settings, journal, guard),
+        }
     }
 
     /// The world's process is another one: nobody's messages have reached it yet.

@@ -12,7 +12,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use scene::{GenerateOptions, Method, Problems, Scene, Settings};
 use shm_types::{Outcome, Verdict};
-use world::World;
+use world::{Guard, World};
 
 use super::driver::Disturbed;
 use super::fault::{Fault, Kind, Terms, draw};
@@ -248,19 +248,18 @@ impl Trial {
 
     /// Runs it with the faults of `plan`.
     pub fn run(&self, plan: Vec<Fault>, onlooker: &mut dyn Onlooker) -> Ended {
-        self.run_in(plan, onlooker, |world| world)
+        self.run_without(plan, onlooker, None)
     }
 
-    /// As [`Self::run`], in a world that `alter` has had its hands on.
-    pub fn run_in(
+    /// As [`Self::run`], in a world that makes all its checks but this one.
+    pub fn run_without(
         &self,
         plan: Vec<Fault>,
         onlooker: &mut dyn Onlooker,
-        alter: impl FnOnce(World) -> World,
+        guard: Option<Guard>,
     ) -> Ended {
-        let world = alter(World::new(&self.scene, self.settings.clone(), 0));
         let end = self.faults_end();
-        let mut run = Disturbed::with_world(&self.scene, &self.settings, plan, end, world);
+        let mut run = Disturbed::without(&self.scene, &self.settings, plan, end, guard);
         let mut finding = None;
         let mut saved = Saved::default();
         while finding.is_none() && run.world().outcome() == Outcome::Running {
@@ -306,13 +305,19 @@ impl Trial {
     }
 
     /// Whether the method cannot be held to having solved a run: it does not solve the room
-    /// undisturbed, or, being one of the paper's, is not robust there or can do nothing with what
-    /// was left, started anew.
+    /// undisturbed; one that plans ahead says that it has found no plan within its limits; one of
+    /// the paper's is not robust there, or can do nothing with what was left, started anew.
     #[must_use]
     pub fn is_beyond(&self, ended: &Ended) -> bool {
-        let is_stuck_afresh = !self.settings.method.plans_ahead() && !ended.is_solved_afresh;
+        let is_lost = || {
+            if self.settings.method.plans_ahead() {
+                ended.verdict == Verdict::NotFound
+            } else {
+                !ended.is_solved_afresh || !self.is_robust()
+            }
+        };
         matches!(ended.finding, Some(Finding::NotLive(_)))
-            && (self.undisturbed.outcome != Outcome::Solved || is_stuck_afresh || !self.is_robust())
+            && (self.undisturbed.outcome != Outcome::Solved || is_lost())
     }
 
     /// Whether the method solves the room whoever happens to be where first, as far as can be seen
