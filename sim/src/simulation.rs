@@ -15,7 +15,7 @@ use shm_types::{
     HardRequest, Invalid, MotionBatch, Outcome, PlannerReport, RoleKind, Schedule, Validate,
     WorldSnapshot, zeroed,
 };
-use world::{FIRST_INCARNATION, Next, NotMade, World, WorldInput};
+use world::{FIRST_INCARNATION, Guard, Next, NotMade, World, WorldInput};
 
 use crate::report::{Cycle, RobotReport, SimReport};
 use crate::tables::Tables;
@@ -131,6 +131,15 @@ impl<'s> Simulation<'s> {
         Self { planner, ..self }
     }
 
+    /// The same with a world that makes all its checks but this one.
+    #[must_use]
+    pub fn without(self, guard: Guard) -> Self {
+        Self {
+            world: self.world.without(guard),
+            ..self
+        }
+    }
+
     /// The newest snapshot.
     #[must_use]
     pub fn snapshot(&self) -> &WorldSnapshot {
@@ -211,6 +220,26 @@ impl<'s> Simulation<'s> {
         let tick = self.world.reply_to(&request).result()?;
         self.tell(kind, RoleKind::Robot, robot, 0);
         Ok(tick)
+    }
+
+    /// The newest messages: commands, the planner's report, the newest table and schedule.
+    #[must_use]
+    pub fn messages(
+        &self,
+    ) -> (
+        &[Command],
+        &PlannerReport,
+        Option<&ConstraintTable>,
+        Option<&Schedule>,
+    ) {
+        let table = self.tables.newest().and_then(|(_, table)| table);
+        let schedule = self.schedules.newest().and_then(|(_, schedule)| schedule);
+        (
+            &self.commands,
+            &self.report,
+            table.map(Checked::get),
+            schedule.map(Checked::get),
+        )
     }
 
     /// The scene in force.

@@ -17,7 +17,7 @@ use crate::change::Next;
 use crate::constraints::Constraints;
 use crate::epoch::Epoch;
 use crate::grants::{Grants, Surroundings};
-use crate::guards::Guards;
+use crate::guards::{Guard, Guards};
 use crate::invariants::Violation;
 use crate::journal::{Event, Journal};
 use crate::motion::{self, Span};
@@ -217,7 +217,8 @@ impl World {
 
     /// Checks the invariants; a broken one ends the run.
     fn watch(&mut self, scene: &Scene, journal: &mut Journal<'_>) {
-        if let Some(violation) = self.find_violation(scene) {
+        let is_watched = !self.guards.holds(Guard::Invariants, false);
+        if is_watched && let Some(violation) = self.find_violation(scene) {
             self.counters.violations += 1;
             self.violation = Some(violation);
             journal.event(violation.event());
