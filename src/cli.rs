@@ -52,8 +52,16 @@ pub(crate) enum Command {
     Validate(ValidateArgs),
     /// List the built-in scenarios, or write them out
     Scenarios(ScenariosArgs),
-    /// List the runs that are alive on this machine
+    /// List the runs that are alive on this machine, and those that can be resumed
     List(ListArgs),
+    /// Go on with a run whose supervisor has died, from the newest tick in its journal
+    Resume(ResumeArgs),
+    /// Remove what dead runs of this user have left; they cannot be resumed any more
+    Gc(GcArgs),
+    /// Say what is wrong with this machine, and how to mend it
+    Doctor(DoctorArgs),
+    /// Kill and stall the processes of runs, which have to end as if nothing had been
+    Chaos(ChaosArgs),
     /// Tell a live run that something has changed: a goal, an object, a wall, a robot
     Tell(TellArgs),
     /// Run scenarios in which processes die, messages are lost and robots slip, seed by seed
@@ -106,6 +114,9 @@ pub(crate) struct RoleArgs {
     /// Which robot, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..MAX_ROBOTS))]
     pub(crate) index: u32,
+    /// Which process of this participant it is, counted from 1
+    #[arg(long, value_name = "K", default_value_t = world::FIRST_INCARNATION)]
+    pub(crate) incarnation: u32,
 }
 
 const MAX_ROBOTS: i64 = shm_types::capacity::MAX_ROBOTS as i64;
@@ -306,6 +317,141 @@ pub(crate) struct ScenariosArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(after_help = format!("\
+What was in the trace and in the journal goes on, so the result is that of the whole run.
+
+Examples:
+  rearrange list
+  rearrange resume night --json
+
+{STATUSES}"))]
+pub(crate) struct ResumeArgs {
+    /// Id or name of the run, or latest for the one started last
+    #[arg(default_value = node::domain::LATEST)]
+    pub(crate) run: String,
+    /// Print the result as one JSON object on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct GcArgs {
+    /// Only say what would be removed
+    #[arg(long)]
+    pub(crate) dry_run: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "Exit status: 0 if runs work here, warnings or not; 7 if they do not.")]
+pub(crate) struct DoctorArgs {
+    /// Print a JSON array
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// When a process is struck.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Phase {
+    /// From its start to its first answer.
+    Setup,
+    /// While all processes of the run are ready.
+    Steady,
+}
+
+/// Who is struck.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Target {
+    /// Any robot.
+    Robots,
+    /// The planner.
+    Planner,
+    /// The world.
+    World,
+    /// The one who starts and watches the others; all of them die with it.
+    Supervisor,
+    /// The writer of the trace.
+    Recorder,
+}
+
+impl std::fmt::Display for Phase {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Self::Setup => "setup",
+            Self::Steady => "steady",
+        })
+    }
+}
+
+impl std::fmt::Display for Target {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Self::Robots => "robots",
+            Self::Planner => "planner",
+            Self::World => "world",
+            Self::Supervisor => "supervisor",
+            Self::Recorder => "recorder",
+        })
+    }
+}
+
+/// Who sets the pace of the runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ChaosClock {
+    /// The slowest participant.
+    Lockstep,
+    /// The wall clock.
+    Real,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+As many runs are made as the kills need. A kill counts only while a task is open. The exit status is
+0 only if every run ended solved, with nothing violated and nothing left; 6 if something was
+violated, 7 for anything else. See docs/chaos.md.
+
+Examples:
+  rearrange chaos --kills 200
+  rearrange chaos room.toml --kills 1000 --seed 7 --during setup --targets robots,world --json")]
+pub(crate) struct ChaosArgs {
+    /// Scenario file (TOML), or the name of a built-in scenario
+    #[arg(default_value = crate::scenario::DEFAULT)]
+    pub(crate) scenario: String,
+    /// Take only the first M robots [default: all]
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=MAX_ROBOTS))]
+    pub(crate) robots: Option<u32>,
+    /// How many processes are killed, in equal shares of phases and roles; some are stalled besides
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    pub(crate) kills: usize,
+    /// What decides who is struck how; the instants are not the same twice
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// When they are struck
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        default_value = "setup,steady"
+    )]
+    pub(crate) during: Vec<Phase>,
+    /// Who is struck
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        default_value = "robots,planner,world,supervisor"
+    )]
+    pub(crate) targets: Vec<Target>,
+    /// Who sets the pace of the runs
+    #[arg(long, value_enum, default_value_t = ChaosClock::Lockstep)]
+    pub(crate) clock: ChaosClock,
+    /// Print the report as one JSON object on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct ListArgs {
     /// Print a JSON array
     #[arg(long)]
@@ -376,6 +522,11 @@ pub(crate) enum What {
     },
     /// A robot takes part no more: it stays where it is, with what it holds, as an obstacle
     Lose {
+        /// Number of the robot
+        robot: u32,
+    },
+    /// A robot that was started again with `--restart hold` may move again
+    Release {
         /// Number of the robot
         robot: u32,
     },

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use node::options::{Clock, DEFAULT_MONITORS, DEFAULT_RATE_HZ, MAX_MONITORS, MAX_RATE_HZ};
-use node::options::{Delay, Role, Wait};
+use node::options::{DEFAULT_SILENCE_LIMIT, Delay, GiveUp, Restart, Role, Wait};
 use scene::{Compute, HardMode, Method, Performance, Settings};
 use serde::de::DeserializeOwned;
 use serde::de::value::{Error as NameError, StrDeserializer};
@@ -135,6 +135,17 @@ pub(crate) struct ProcessArgs {
     /// Places kept free for programs that watch
     #[arg(long, value_name = "N", default_value_t = DEFAULT_MONITORS, value_parser = clap::value_parser!(u32).range(0..=i64::from(MAX_MONITORS)))]
     pub(crate) monitors: u32,
+    /// What follows when a process dies: it is started again and takes up where it was; likewise,
+    /// but a robot waits for `rearrange tell release`; or it is gone for good
+    #[arg(long, value_name = "WHAT", default_value = "auto", value_parser = named::<Restart>(&["auto", "hold", "never"]))]
+    pub(crate) restart: Restart,
+    /// Start a process no more that ends so often in a row, or for so many seconds (like 30s),
+    /// without answering a tick: a robot is then an obstacle, without anybody else the run ends
+    #[arg(long, value_name = "N|SECONDSs", default_value_t)]
+    pub(crate) give_up_after: GiveUp,
+    /// Kill a process that says and does nothing for so many seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = DEFAULT_SILENCE_LIMIT.as_secs_f64(), value_parser = number(0.05, 3_600.0))]
+    pub(crate) silence_limit: f64,
     /// Make a process slow on purpose: ROLE=MS or ROLE=MSxTICKS (for tests)
     #[arg(long, value_name = "ROLE=MS[xTICKS]", hide = true, value_parser = delay)]
     pub(crate) delay: Vec<Delay>,
@@ -194,6 +205,11 @@ impl RunArgs {
                 ("--realtime", self.process.realtime),
                 ("--name", self.process.name.is_some()),
                 ("--delay", !self.process.delay.is_empty()),
+                ("--restart", self.process.restart != Restart::Auto),
+                (
+                    "--give-up-after",
+                    self.process.give_up_after != GiveUp::default(),
+                ),
                 ("--wait spin", self.process.wait == Wait::Spin),
                 ("--wait block", self.process.wait == Wait::Block),
             ];

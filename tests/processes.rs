@@ -189,9 +189,9 @@ fn ctrl_c_ends_a_run_whose_robot_is_stopped() {
 }
 
 #[test]
-fn a_process_that_dies_ends_the_run_by_name() {
-    for role in [Role::World, Role::Planner, Role::Robot(1), Role::Recorder] {
-        let mut run = Run::start(&SLOW);
+fn without_restarts_a_process_that_dies_ends_the_run_by_name() {
+    for role in [Role::World, Role::Planner, Role::Recorder] {
+        let mut run = Run::start(&[SLOW[0], SLOW[1], "--restart", "never"]);
         signal(run.pid_of(role), libc::SIGKILL);
         let (status, result, stderr) = run.end();
         assert_eq!(status, 7, "{role}: {stderr}");
@@ -219,8 +219,9 @@ fn nothing_outlives_a_supervisor_that_is_killed() {
         .assert()
         .success();
     let list: Value = serde_json::from_slice(&list.get_output().stdout).unwrap();
-    assert_eq!(list, Value::Array(Vec::new()));
-    run.assert_nothing_left();
+    assert_eq!(list[0]["live"], false, "{list}");
+    assert_eq!(segments(&run.file.prefix), Vec::<PathBuf>::new());
+    assert!(run.file.root.exists(), "it can be resumed");
 }
 
 #[test]
@@ -271,7 +272,9 @@ fn processes_inherit_nothing_of_the_supervisor() {
 
 #[test]
 fn in_real_time_a_robot_that_stays_silent_is_declared_gone_and_the_others_go_on() {
-    let mut run = Run::start(&REAL);
+    let mut arguments = REAL.to_vec();
+    arguments.extend(["--restart", "never"]);
+    let mut run = Run::start(&arguments);
     let robot = run.pid_of(Role::Robot(1));
     signal(robot, libc::SIGSTOP);
     wait_until("the end of the silent robot", || !is_alive(robot));

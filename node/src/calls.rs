@@ -155,6 +155,11 @@ impl<Q: Message, A: Message> CallService<Q, A> {
 }
 
 impl<Q: Message + Copy, A: Message> Client<Q, A> {
+    /// From the first question on, asks without waiting for somebody to hear it.
+    pub(crate) fn hurry(&self) {
+        self.patience.set(0);
+    }
+
     /// Asks. At most [`OPEN_CALLS`] calls may be held at once.
     ///
     /// # Errors

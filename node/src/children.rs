@@ -7,11 +7,13 @@
 use std::ffi::OsString;
 use std::fs::File;
 use std::io;
-use std::os::unix::process::CommandExt;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 
 use rustix::process::{Pid, Signal, kill_process};
+
+use world::FIRST_INCARNATION;
 
 use crate::options::{Launcher, Role};
 
@@ -22,13 +24,32 @@ const LAST_WORDS: usize = 2_000;
 #[derive(Debug)]
 pub(crate) struct Participant {
     pub(crate) role: Role,
+    /// Which process of its role it is, from 1.
+    pub(crate) incarnation: u32,
     process: Child,
     ended: Option<ExitStatus>,
     log: PathBuf,
 }
 
-/// The arguments of a role after the launcher's own: `ROLE --run DIR [--index N]`.
-pub(crate) fn arguments(role: Role, run_dir: &Path) -> Vec<OsString> {
+/// What a process has done so far, as the kernel tells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Life {
+    /// Processor time, ns.
+    pub(crate) used_ns: u64,
+}
+
+impl Life {
+    /// That of a process; nothing if there is none, or the kernel does not tell.
+    fn of(pid: u32) -> Option<Self> {
+        // To the nanosecond: one that only looks now and then uses little.
+        let text = std::fs::read_to_string(format!("/proc/{pid}/schedstat")).ok()?;
+        let used_ns = text.split_whitespace().next()?.parse().ok()?;
+        Some(Self { used_ns })
+    }
+}
+
+/// The arguments of a role after the launcher's own: `ROLE --run DIR [--index N] [--incarnation K]`.
+pub(crate) fn arguments(role: Role, incarnation: u32, run_dir: &Path) -> Vec<OsString> {
     let mut arguments: Vec<OsString> = vec![
         role.subcommand().into(),
         "--run".into(),
@@ -37,20 +58,28 @@ pub(crate) fn arguments(role: Role, run_dir: &Path) -> Vec<OsString> {
     if let Role::Robot(index) = role {
         arguments.extend(["--index".into(), index.to_string().into()]);
     }
+    if incarnation > FIRST_INCARNATION {
+        arguments.extend(["--incarnation".into(), incarnation.to_string().into()]);
+    }
     arguments
 }
 
 impl Participant {
-    /// Starts a role.
+    /// Starts a role, as its process number `incarnation`, from 1.
     ///
     /// # Errors
     /// The system refused.
-    pub(crate) fn start(launcher: &Launcher, role: Role, run_dir: &Path) -> io::Result<Self> {
+    pub(crate) fn start(
+        launcher: &Launcher,
+        role: Role,
+        incarnation: u32,
+        run_dir: &Path,
+    ) -> io::Result<Self> {
         let log = run_dir.join(format!("{role}.log"));
         let mut command = Command::new(&launcher.program);
         command
             .args(&launcher.before)
-            .args(arguments(role, run_dir))
+            .args(arguments(role, incarnation, run_dir))
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .process_group(0);
@@ -63,6 +92,7 @@ impl Participant {
         unsafe { command.pre_exec(move || bind_to(supervisor)) };
         Ok(Self {
             role,
+            incarnation,
             process: command.spawn()?,
             ended: None,
             log,
@@ -81,6 +111,11 @@ impl Participant {
         self.ended
     }
 
+    /// What it has done so far.
+    pub(crate) fn life(&self) -> Option<Life> {
+        Life::of(self.pid())
+    }
+
     /// Asks it to end.
     pub(crate) fn terminate(&mut self) {
         // Not reaped yet, so the process id is still its own.
@@ -96,6 +131,21 @@ impl Participant {
         if self.ended().is_none() {
             let _ = self.process.kill();
             self.ended = self.process.wait().ok();
+        }
+    }
+
+    /// Whether it has ended of its own accord, and not well.
+    pub(crate) fn has_failed_by_itself(&self) -> bool {
+        let code = self.ended.and_then(|status| status.code());
+        code.is_some_and(|code| code != 0)
+    }
+
+    /// How it ended, in a few words: `signal 9`, `status 7`.
+    pub(crate) fn how(&self) -> String {
+        match self.ended.map(|status| (status.code(), status.signal())) {
+            Some((Some(code), _)) => format!("status {code}"),
+            Some((None, Some(signal))) => format!("signal {signal}"),
+            _ => "running".to_owned(),
         }
     }
 
@@ -146,5 +196,20 @@ fn bind_to(supervisor: Pid) -> io::Result<()> {
         Ok(())
     } else {
         Err(io::Error::last_os_error())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_process_that_works_is_told_from_one_that_does_not() {
+        let own = || Life::of(std::process::id()).unwrap().used_ns;
+        let before = own();
+        while own() == before {
+            std::hint::black_box((0..10_000).sum::<u64>());
+        }
+        assert_eq!(Life::of(u32::MAX), None);
     }
 }

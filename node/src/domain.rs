@@ -6,9 +6,11 @@
 //! options mean.
 //!
 //! A run is *live* while its supervisor holds the lock of its directory; the kernel lets go of
-//! the lock when the supervisor dies, however it dies. Every start sweeps away what dead runs of
-//! this user have left.
+//! the lock when the supervisor dies, however it dies. What a dead run has left in shared memory is
+//! swept away by the next start of this user; its directory stays, since the run can be resumed,
+//! until somebody asks for it to go (`gc`).
 
+mod dead;
 mod run_file;
 mod runs;
 #[cfg(test)]
@@ -18,13 +20,15 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use shm_types::Counts;
 use shm_types::capacity::LAYOUT_VERSION;
 
-use crate::options::{Clock, RunOptions};
+use crate::options::{Clock, Recovery, RunOptions};
 use crate::shared_memory;
+pub use dead::{Leftover, gc, leftovers};
 pub use run_file::{Process, RunFile};
 use runs::Runs;
 
@@ -34,6 +38,10 @@ pub const MAX_ROOT_AND_PREFIX: usize = 60;
 const RUN_FILE: &str = "run.json";
 const SCENARIO_FILE: &str = "scenario.toml";
 const LOCK_FILE: &str = "lock";
+/// How long it may take until nobody holds the lock of a supervisor that is dead.
+const LET_GO: Duration = Duration::from_secs(3);
+/// Sleep between two looks.
+const PERIOD: Duration = Duration::from_millis(2);
 /// What stands for the run started last.
 pub const LATEST: &str = "latest";
 
@@ -67,6 +75,28 @@ pub enum DomainError {
          not \"latest\""
     )]
     BadName(String),
+    /// A run that is live needs no resuming.
+    #[error("run {0:?} is live: there is nothing to resume")]
+    Live(String),
+    /// No dead run has this name.
+    #[error(
+        "no dead run has the name or id {name:?}; those that can be resumed: {}",
+        or_none(dead)
+    )]
+    NotResumable {
+        /// What was asked for.
+        name: String,
+        /// Names of those that can be resumed.
+        dead: Vec<String>,
+    },
+    /// A process of a dead run is still there.
+    #[error("process {pid} of the dead run {name:?} does not end; kill it, and try again")]
+    Undead {
+        /// The run.
+        name: String,
+        /// The process.
+        pid: u32,
+    },
     /// No run is live.
     #[error("no run is live; start one with `rearrange run`")]
     NoneLive,
@@ -114,10 +144,12 @@ pub(crate) struct NewRun<'a> {
     pub(crate) counts: Counts,
     pub(crate) shared_memory_bytes: u64,
     pub(crate) options: &'a RunOptions,
+    pub(crate) recovery: Recovery,
+    pub(crate) silence_limit_s: f64,
 }
 
 impl RunDirectory {
-    /// Makes a place for a run, after sweeping away dead ones.
+    /// Makes a place for a run, after sweeping away what dead ones have left in shared memory.
     ///
     /// # Errors
     /// The directory of runs is not private, the name is live, or the system refused.
@@ -130,8 +162,9 @@ impl RunDirectory {
             runs::check_name(name)?;
         }
         let runs = Runs::open(runs)?;
+        let live = runs.all()?.live;
         if let Some(name) = new.name
-            && let Some(run) = runs.live()?.into_iter().find(|run| run.name == name)
+            && let Some(run) = live.into_iter().find(|run| run.name == name)
         {
             return Err(DomainError::NameLive {
                 name: run.name,
@@ -154,8 +187,52 @@ impl RunDirectory {
             supervisor_pid: std::process::id(),
             processes: Vec::new(),
             options: new.options.clone(),
+            recovery: new.recovery,
+            silence_limit_s: new.silence_limit_s,
         };
         directory.put(SCENARIO_FILE, new.scenario_text.as_bytes())?;
+        directory.write_run(&run)?;
+        Ok((directory, run))
+    }
+
+    /// Takes over the directory of a dead run, of this id or name or the newest for "latest", once
+    /// none of its processes is left, and removes what they have left of the domain.
+    ///
+    /// # Errors
+    /// There is none, a process of it will not go, or the system refused.
+    pub(crate) fn take_over(name: &str) -> Result<(Self, RunFile), DomainError> {
+        let by = Instant::now() + LET_GO;
+        let (runs, mut all, found) = loop {
+            let runs = Runs::open(runs::default_path())?;
+            let all = runs.all()?;
+            if let Some(found) = choose(&all.dead, name) {
+                break (runs, all, found);
+            }
+            let live = choose(&all.live, name).map(|live| &all.live[live]);
+            // A process that a supervisor was just starting when it died holds the lock until it
+            // becomes the role, or finds that nobody is there.
+            let is_dying = live.is_some_and(|live| !is_alive(live.supervisor_pid));
+            if is_dying && Instant::now() < by {
+                drop(runs);
+                std::thread::sleep(PERIOD);
+                continue;
+            }
+            return Err(match live {
+                Some(live) if name != LATEST || all.dead.is_empty() => {
+                    DomainError::Live(live.name.clone())
+                }
+                _ => DomainError::NotResumable {
+                    name: name.to_owned(),
+                    dead: all.dead.into_iter().map(|run| run.name).collect(),
+                },
+            });
+        };
+        let mut run = all.dead.swap_remove(found);
+        let directory = runs.lock_again(&run)?;
+        dead::await_end(&run)?;
+        directory.clear_shared_memory()?;
+        dead::clear_domain(&run)?;
+        run.supervisor_pid = std::process::id();
         directory.write_run(&run)?;
         Ok((directory, run))
     }
@@ -201,9 +278,9 @@ impl Drop for RunDirectory {
     }
 }
 
-/// A live run, as `list` tells it.
+/// A run, as `list` tells it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct LiveRun {
+pub struct ListedRun {
     /// Eight hexadecimal digits.
     pub id: String,
     /// Its name.
@@ -218,11 +295,14 @@ pub struct LiveRun {
     pub robots: u32,
     /// Who sets the pace.
     pub clock: Clock,
+    /// Whether its supervisor is alive; if not, it can be resumed.
+    pub live: bool,
 }
 
-impl From<RunFile> for LiveRun {
-    fn from(run: RunFile) -> Self {
+impl ListedRun {
+    fn new(run: RunFile, live: bool) -> Self {
         Self {
+            live,
             id: run.id,
             name: run.name,
             directory: run.root,
@@ -234,13 +314,16 @@ impl From<RunFile> for LiveRun {
     }
 }
 
-/// Every live run of this user, by id. Sweeps away what dead ones have left.
+/// Every run of this user, the live ones first, by id. Sweeps away what dead ones have left in
+/// shared memory.
 ///
 /// # Errors
 /// The directory of runs is not private, or the system refused.
-pub fn list() -> Result<Vec<LiveRun>, DomainError> {
-    let live = Runs::open(runs::default_path())?.live()?;
-    Ok(live.into_iter().map(LiveRun::from).collect())
+pub fn list() -> Result<Vec<ListedRun>, DomainError> {
+    let all = Runs::open(runs::default_path())?.all()?;
+    let live = all.live.into_iter().map(|run| ListedRun::new(run, true));
+    let dead = all.dead.into_iter().map(|run| ListedRun::new(run, false));
+    Ok(live.chain(dead).collect())
 }
 
 /// Writes a private file, renamed into place.
@@ -259,23 +342,41 @@ fn put(path: &Path, bytes: &[u8]) -> Result<(), DomainError> {
     write().map_err(|e| file_error(path, e))
 }
 
+/// The directory of a run of this name, live or dead, if there is one. Looks without waiting for
+/// anybody who starts or lists runs.
+#[must_use]
+pub fn directory_of(name: &str) -> Option<PathBuf> {
+    let directories = fs::read_dir(runs::default_path()).ok()?;
+    let mut runs = (directories.flatten()).filter_map(|run| RunFile::read(&run.path()).ok());
+    runs.find(|run| run.name == name).map(|run| run.root)
+}
+
 /// The live run of this id or name, or the one started last for "latest".
 ///
 /// # Errors
 /// There is none, or the directory of runs cannot be used.
 pub(crate) fn find(name: &str) -> Result<RunFile, DomainError> {
-    let mut live = Runs::open(runs::default_path())?.live()?;
-    let found = match name {
-        LATEST => (0..live.len()).max_by_key(|&run| runs::began(&live[run].root)),
-        name => (live.iter()).position(|run| run.id == name || run.name == name),
-    };
-    match found {
+    let mut live = Runs::open(runs::default_path())?.all()?.live;
+    match choose(&live, name) {
         Some(run) => Ok(live.swap_remove(run)),
         None if name == LATEST => Err(DomainError::NoneLive),
         None => Err(DomainError::Unknown {
             name: name.to_owned(),
             live: live.into_iter().map(|run| run.name).collect(),
         }),
+    }
+}
+
+/// Whether there is a process of this number.
+fn is_alive(pid: u32) -> bool {
+    Path::new(&format!("/proc/{pid}")).exists()
+}
+
+/// The place of the run of this id or name, or of the newest.
+fn choose(runs: &[RunFile], name: &str) -> Option<usize> {
+    match name {
+        LATEST => (0..runs.len()).max_by_key(|&run| runs::began(&runs[run].root)),
+        name => (runs.iter()).position(|run| run.id == name || run.name == name),
     }
 }
 

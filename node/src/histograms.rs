@@ -38,6 +38,8 @@ pub enum Timed {
     SnapshotSend,
     /// One step of the world.
     WorldStep,
+    /// Putting a tick into the world's journal.
+    Journal,
     /// One step of the planner.
     PlannerStep,
     /// One step of a robot.
@@ -60,7 +62,7 @@ pub enum Timed {
 
 impl Timed {
     /// All of them, in the order in which they are reported.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::SnapshotAge,
         Self::PlannerSnapshotAge,
         Self::SnapshotLateness,
@@ -68,6 +70,7 @@ impl Timed {
         Self::SnapshotWrite,
         Self::SnapshotSend,
         Self::WorldStep,
+        Self::Journal,
         Self::PlannerStep,
         Self::RobotStep,
         Self::CommandToGrant,
@@ -90,6 +93,7 @@ impl Timed {
             Self::SnapshotWrite => "snapshot_write",
             Self::SnapshotSend => "snapshot_send",
             Self::WorldStep => "world_step",
+            Self::Journal => "journal",
             Self::PlannerStep => "planner_step",
             Self::RobotStep => "robot_step",
             Self::CommandToGrant => "command_to_grant",

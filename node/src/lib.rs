@@ -8,8 +8,10 @@
 mod calls;
 mod children;
 mod clock;
+pub mod doctor;
 pub mod domain;
 pub mod histograms;
+mod journal;
 pub mod options;
 mod ports;
 mod realtime;
@@ -25,6 +27,7 @@ mod wait;
 mod wakes;
 mod wire;
 
+pub use clock::now_ns as monotonic_ns;
 pub use histograms::{Latencies, LatencySummary, Timed};
 pub use options::{
     Clock, Delay, Launcher, OptionError, Role, RunOptions, RunPlan, Told, ToldAt, Wait,

@@ -16,7 +16,8 @@ use scene::{Change, Settings};
 use serde::{Deserialize, Serialize};
 use shm_types::Counts;
 
-pub use plan::{DEFAULT_SETUP_DEADLINE, DEFAULT_SILENCE_LIMIT, Launcher, RunPlan};
+pub use plan::{DEFAULT_GIVE_UP_AFTER, DEFAULT_SETUP_DEADLINE, DEFAULT_SILENCE_LIMIT};
+pub use plan::{GiveUp, Launcher, Recovery, Restart, RunPlan};
 pub use role::{Role, UnknownRole};
 
 /// Default period of the world in real time.

@@ -21,11 +21,12 @@ use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{BackpressureStrategy, ipc};
 use shm_types::Outcome;
+use world::FIRST_INCARNATION;
 
 use crate::children::Participant;
 use crate::domain::{NewRun, RunDirectory, RunFile};
 use crate::histograms::Latencies;
-use crate::options::{Launcher, Role, RunPlan};
+use crate::options::{Launcher, Recovery, Role, RunPlan};
 use crate::ports::{self, Service, TopicError, failed};
 use crate::report::RoleReport;
 use crate::roles::{RoleError, Seat};
@@ -89,6 +90,8 @@ pub fn run(plan: &RunPlan) -> Result<ReferenceReport, RunError> {
         counts,
         shared_memory_bytes: topics.bytes(),
         options: &options,
+        recovery: Recovery::default(),
+        silence_limit_s: plan.silence_limit.as_secs_f64(),
     })?;
     let node = ports::join(&file.root, &file.prefix, "supervisor")?;
     make_private(&file)?;
@@ -152,10 +155,12 @@ fn start(plan: &RunPlan, file: &RunFile, directory: &Path) -> Result<Vec<Partici
     };
     Role::all(file.robots)
         .map(|role| {
-            Participant::start(&launcher, role, directory).map_err(|source| RunError::Start {
-                role,
-                program: launcher.program.display().to_string(),
-                source,
+            Participant::start(&launcher, role, FIRST_INCARNATION, directory).map_err(|source| {
+                RunError::Start {
+                    role,
+                    program: launcher.program.display().to_string(),
+                    source,
+                }
             })
         })
         .collect()
@@ -188,7 +193,7 @@ fn end(processes: &mut [Participant]) {
 /// # Errors
 /// Set-up failed, or iceoryx2 did.
 pub fn main(role: Role, run_dir: &Path) -> Result<(), RoleError> {
-    let seat = Seat::take(run_dir, role)?;
+    let seat = Seat::take(run_dir, role, FIRST_INCARNATION)?;
     match role {
         Role::World => publisher::main(seat),
         Role::Planner | Role::Robot(_) => reader::main(seat),

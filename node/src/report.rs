@@ -20,6 +20,8 @@ pub struct RoleReport {
     pub role: Role,
     /// Its process id.
     pub pid: u32,
+    /// Which process of this participant it was, from 1: what follows is of this one alone.
+    pub incarnation: u32,
     /// Ticks it answered (the world: ticks it made).
     pub ticks_answered: u64,
     /// Processor time it used, user and system, seconds.
@@ -202,6 +204,7 @@ impl RoleReport {
         Self {
             role,
             pid,
+            incarnation: 0,
             ticks_answered: 0,
             cpu_s: 0.0,
             wall_s: 0.0,

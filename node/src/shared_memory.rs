@@ -4,18 +4,21 @@
 //! free shared memory, and the limit on descriptors.
 //! Not responsible for: how much a run needs (`topics`), or its directory (`domain`).
 //!
-//! Terms: a *half-made* file is one of no length, left by a process killed while it set up a
-//! connection; everybody who sets up afterwards waits for it to grow, without end.
+//! Terms: a *half-made* file is one of no length, or one that its owner may not read yet, left by a
+//! process killed while it set up a connection; everybody who opens it waits for it to be made
+//! whole, without end.
 
 use std::fs;
 use std::io;
 use std::os::unix::fs::PermissionsExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
 /// Where POSIX shared memory lies on Linux.
 pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
+/// What comes before a mapped file's name in /proc.
+const MAPPED: &str = " /dev/shm/";
 /// End of the name of the file that every set-up in a domain reads.
 const MANAGEMENT: &[u8] = b".global_mgmt";
 /// Descriptors a process needs beside its connections.
@@ -111,6 +114,61 @@ pub(crate) fn make_private(prefix: &str) -> io::Result<()> {
     })
 }
 
+/// Whether a file is half-made.
+fn is_half_made(file: &fs::Metadata) -> bool {
+    file.len() == 0 || file.permissions().mode() & 0o400 == 0
+}
+
+/// Names of the half-made files of one prefix.
+///
+/// # Errors
+/// The system refused.
+pub(crate) fn half_made(prefix: &str) -> io::Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    for_each_file(prefix, |path, file| {
+        if is_half_made(file) {
+            found.push(path.to_owned());
+        }
+        Ok(())
+    })?;
+    Ok(found)
+}
+
+/// Names of the files in shared memory that any process of this user has open or mapped, as far as
+/// can be seen.
+pub(crate) fn in_use() -> Vec<String> {
+    let mut used = Vec::new();
+    let Ok(processes) = fs::read_dir("/proc") else {
+        return used;
+    };
+    for process in processes.flatten() {
+        let name = process.file_name();
+        if !name.as_encoded_bytes().iter().all(u8::is_ascii_digit) {
+            continue;
+        }
+        used.extend(opened_by(&process.path()));
+        let maps = fs::read_to_string(process.path().join("maps")).unwrap_or_default();
+        let mapped = maps.lines().filter_map(|line| line.split_once(MAPPED));
+        used.extend(mapped.map(|(_, name)| name.to_owned()));
+    }
+    used
+}
+
+/// Names of the files in shared memory that a process has open: the one in this directory of /proc.
+pub(crate) fn opened_by(process: &Path) -> Vec<String> {
+    let Ok(descriptors) = fs::read_dir(process.join("fd")) else {
+        return Vec::new();
+    };
+    let targets = descriptors
+        .flatten()
+        .filter_map(|fd| fs::read_link(fd.path()).ok());
+    let names = targets.filter_map(|target| {
+        let name = target.strip_prefix(SHARED_MEMORY).ok()?;
+        Some(name.to_string_lossy().into_owned())
+    });
+    names.collect()
+}
+
 /// Removes the half-made files of one prefix. Only once every process in set-up is dead.
 ///
 /// # Errors
@@ -118,7 +176,7 @@ pub(crate) fn make_private(prefix: &str) -> io::Result<()> {
 pub(crate) fn remove_half_made(prefix: &str) -> io::Result<u32> {
     let mut removed = 0;
     for_each_file(prefix, |path, file| {
-        if file.len() == 0 {
+        if is_half_made(file) {
             fs::remove_file(path)?;
             removed += 1;
         }
@@ -172,7 +230,7 @@ mod tests {
             Self(format!("rrtest{}{name}_", std::process::id()))
         }
 
-        fn file(&self, name: &str, bytes: &[u8]) -> std::path::PathBuf {
+        fn file(&self, name: &str, bytes: &[u8]) -> PathBuf {
             let path = Path::new(SHARED_MEMORY).join(format!("{}{name}", self.0));
             fs::write(&path, bytes).unwrap();
             path

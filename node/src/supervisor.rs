@@ -6,38 +6,43 @@
 //! Terms: a participant is *ready* once it has answered its first tick; until then it is in
 //! *set-up*. It is *lost* when its process ends before the run does.
 //!
-//! In this version a lost participant ends the run, with one exception: in real time a robot that
-//! is silent for too long is killed and declared gone, and the others go on around it.
+//! A participant that is lost is started again and takes up where it was (`recovery`); so is a run
+//! whose supervisor was lost ([`resume`]).
 
+mod diary;
 mod ending;
-mod set_up;
+mod janitor;
+mod member;
+mod recovery;
 mod signals;
 mod watch;
 
 use std::io;
 use std::time::{Duration, Instant};
 
-use shm_types::{Checked, ControlKind, ControlRequest, Outcome, RoleKind, WorldSnapshot};
-use world::FIRST_INCARNATION;
+use scene::Scene;
+use shm_types::{Checked, ControlKind, ControlRequest, Counts, Outcome, RoleKind, WorldSnapshot};
 
-use crate::children::Participant;
 use crate::domain::{DomainError, NewRun, RunDirectory, RunFile};
-use crate::options::{self, Clock, OptionError, Role, RunPlan};
+use crate::options::{self, OptionError, Role, RunOptions, RunPlan};
 use crate::ports::{self, IpcNode, TopicError};
 use crate::report::RunReport;
 use crate::shared_memory::{self, ResourceError};
 use crate::topics::{HeldTopics, Topics};
+use diary::Diary;
+pub use diary::{DIARY_FILE, Entry, Happened};
+use janitor::Janitor;
+use member::Member;
+pub(crate) use recovery::make_private;
+pub use signals::Signals;
 use watch::Watch;
 
-pub(crate) use set_up::make_private;
-pub use signals::Signals;
-
 /// Sleep between two looks at the processes.
-const PERIOD: Duration = Duration::from_millis(5);
+const PERIOD: Duration = Duration::from_millis(2);
 /// Wall time between two calls of [`Observer::progress`].
 const PROGRESS_EVERY: Duration = Duration::from_millis(100);
-/// How long the news of the run's end may take to come to the supervisor.
-const NEWS_GRACE: Duration = Duration::from_millis(200);
+/// How long the world may take to do what it is asked to before it is asked again.
+const ASK_AGAIN: Duration = Duration::from_millis(50);
 /// How long the world may take to end the run once it is asked to.
 const STOP_GRACE: Duration = Duration::from_secs(3);
 
@@ -127,7 +132,28 @@ enum End {
 /// # Errors
 /// The run could not be started; nothing of it is left.
 pub fn run(plan: &RunPlan, observer: &mut dyn Observer) -> Result<RunReport, RunError> {
-    let mut run = Run::prepare(plan)?;
+    carry_out(Run::prepare(plan)?, observer)
+}
+
+/// Goes on with a run whose supervisor has died, from the newest tick in its journal: the one of
+/// this id or name, or for "latest" the one started last. `plan` makes the plan from what its
+/// directory says.
+///
+/// # Errors
+/// There is none, or it could not be gone on with. It can be tried again then.
+pub fn resume(
+    run: &str,
+    plan: impl FnOnce(&RunFile, String) -> RunPlan,
+    observer: &mut dyn Observer,
+) -> Result<RunReport, RunError> {
+    let (directory, file) = RunDirectory::take_over(run)?;
+    let scenario = RunFile::read_scenario(directory.path())?;
+    let plan = plan(&file, scenario);
+    let scene = parse(&plan)?;
+    carry_out(Run::begin(&plan, &scene, directory, file)?, observer)
+}
+
+fn carry_out(mut run: Run<'_>, observer: &mut dyn Observer) -> Result<RunReport, RunError> {
     let end = match run.set_up()? {
         Some(end) => end,
         None => {
@@ -135,6 +161,7 @@ pub fn run(plan: &RunPlan, observer: &mut dyn Observer) -> Result<RunReport, Run
             run.attend(observer)
         }
     };
+    run.diary.note(Happened::Over);
     let report = run.wind_up(end);
     for note in &report.notes {
         observer.note(note);
@@ -142,21 +169,31 @@ pub fn run(plan: &RunPlan, observer: &mut dyn Observer) -> Result<RunReport, Run
     Ok(report)
 }
 
+fn parse(plan: &RunPlan) -> Result<Scene, RunError> {
+    scene::parse(&plan.scenario, "scenario.toml").map_err(|error| RunError::Scenario(error.plain()))
+}
+
 /// A run and all its processes. Fields are dropped in this order: processes before shared memory,
 /// shared memory before the directory.
 struct Run<'p> {
     plan: &'p RunPlan,
-    participants: Vec<Participant>,
+    members: Vec<Member>,
     watch: Watch,
+    janitor: Janitor,
     _topics: HeldTopics,
     node: IpcNode,
+    diary: Diary,
     directory: RunDirectory,
     file: RunFile,
     signals: Signals,
     requests: u64,
     restarts: u64,
-    /// By when the world has to have ended the run, once it is asked to.
-    stop_by: Option<Instant>,
+    /// Half-made files that were removed.
+    cleared: u32,
+    /// Tasks that are open, as last noted.
+    open_tasks: Option<usize>,
+    /// By when the world has to have ended the run, once it is asked to; when it was asked last.
+    stop_by: Option<(Instant, Instant)>,
     notes: Vec<String>,
     oversubscribed: bool,
 }
@@ -164,17 +201,14 @@ struct Run<'p> {
 impl<'p> Run<'p> {
     /// Checks what can be checked, and makes the place and the topics of the run.
     fn prepare(plan: &'p RunPlan) -> Result<Self, RunError> {
-        let scene = scene::parse(&plan.scenario, "scenario.toml")
-            .map_err(|error| RunError::Scenario(error.plain()))?;
+        let scene = parse(plan)?;
         let counts = scene.counts();
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         plan.options.check(counts, cores)?;
         let topics = Topics::of(counts, plan.options.settings.method, plan.options.monitors);
-        let participants = u64::from(counts.robots + plan.options.monitors) + 5;
-        shared_memory::reserve(topics.bytes(), participants)?;
-        let signals = Signals::watch().map_err(RunError::Signals)?;
         let mut options = plan.options.clone();
         options.settings.tick_ns = options.clock.tick_ns(options.settings.tick_ns);
+        reserve(&topics, counts, &options)?;
         let (directory, file) = RunDirectory::create(&NewRun {
             name: plan.name.as_deref(),
             scenario_text: &plan.scenario,
@@ -183,20 +217,61 @@ impl<'p> Run<'p> {
             counts,
             shared_memory_bytes: topics.bytes(),
             options: &options,
+            recovery: plan.recovery,
+            silence_limit_s: plan.silence_limit.as_secs_f64(),
         })?;
+        Self::begin(plan, &scene, directory, file)
+    }
+
+    /// Makes the topics of a run that has a place.
+    fn begin(
+        plan: &'p RunPlan,
+        scene: &Scene,
+        directory: RunDirectory,
+        file: RunFile,
+    ) -> Result<Self, RunError> {
+        let counts = scene.counts();
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let options = &file.options;
+        let topics = Topics::of(counts, options.settings.method, options.monitors);
+        reserve(&topics, counts, options)?;
+        let signals = Signals::watch().map_err(RunError::Signals)?;
+        let mut diary = Diary::open(directory.path()).map_err(|source| DomainError::File {
+            path: directory.path().join(DIARY_FILE),
+            source,
+        })?;
+        diary.note(Happened::Supervised {
+            pid: std::process::id(),
+        });
         let node = ports::join(&file.root, &file.prefix, "supervisor")?;
         make_private(&file)?;
+        let janitor = Janitor::start(file.prefix.clone()).map_err(RunError::Signals)?;
         let topics = topics.create(&node)?;
+        let started = diary::started(directory.path());
+        let before = |role| {
+            let of_role = started.iter().filter(|(who, _)| *who == role);
+            // One more may have been started and not been noted.
+            of_role
+                .map(|(_, incarnation)| incarnation + 1)
+                .max()
+                .unwrap_or(0)
+        };
         Ok(Self {
             plan,
-            participants: Vec::new(),
+            members: Role::all(file.robots)
+                .map(|role| Member::new(role, before(role)))
+                .collect(),
             watch: Watch::new(&topics, &file)?,
+            janitor,
             _topics: topics,
             node,
+            diary,
             directory,
             signals,
             requests: 0,
             restarts: 0,
+            cleared: 0,
+            open_tasks: None,
             stop_by: None,
             notes: Vec::new(),
             oversubscribed: options::processes(counts) > cores,
@@ -222,88 +297,71 @@ impl<'p> Run<'p> {
     }
 
     /// One look at everything; the end, if this is it.
-    fn watch_once(&mut self) -> Result<Option<End>, TopicError> {
+    fn watch_once(&mut self) -> Result<Option<End>, RunError> {
         self.watch.look()?;
+        self.note_tasks();
         if let Some(outcome) = self.watch.outcome() {
             return Ok(Some(End::Outcome(outcome)));
         }
-        if let Some(words) = self.lost() {
-            return self.end_after(words).map(Some);
+        if let Some(end) = self.recover()? {
+            return Ok(Some(end));
         }
         if self.signals.take() {
             if self.stop_by.is_some() {
                 return Ok(Some(End::Interrupted));
             }
-            self.ask(ControlKind::Stop, RoleKind::World, 0)?;
-            self.stop_by = Some(Instant::now() + STOP_GRACE);
+            let now = Instant::now();
+            self.stop_by = Some((now + STOP_GRACE, now));
+            self.ask(ControlKind::Stop, RoleKind::World, 0, 0)?;
         }
-        if self.stop_by.is_some_and(|by| Instant::now() > by) {
-            return Ok(Some(End::Interrupted));
-        }
-        self.dismiss_silent()
-    }
-
-    /// A participant has left: because it has seen an end that is yet to come to us, or because
-    /// it was lost.
-    fn end_after(&mut self, words: String) -> Result<End, TopicError> {
-        let by = Instant::now() + NEWS_GRACE;
-        while Instant::now() < by {
-            self.watch.look()?;
-            if let Some(outcome) = self.watch.outcome() {
-                return Ok(End::Outcome(outcome));
+        if let Some((by, asked)) = self.stop_by {
+            let now = Instant::now();
+            if now > by {
+                return Ok(Some(End::Interrupted));
             }
-            std::thread::sleep(PERIOD);
+            // The world may have been started again since.
+            if now - asked > ASK_AGAIN {
+                self.stop_by = Some((by, now));
+                self.ask(ControlKind::Stop, RoleKind::World, 0, 0)?;
+            }
         }
-        Ok(End::Lost(words))
-    }
-
-    /// The last words of a participant whose process has ended, if one has.
-    fn lost(&mut self) -> Option<String> {
-        let mut ended = self
-            .participants
-            .iter_mut()
-            .filter_map(|one| one.ended().is_some().then(|| one.last_words()));
-        ended.next()
-    }
-
-    /// In real time, kills who has been silent for too long. A robot is declared gone; without
-    /// any other participant the run cannot go on.
-    fn dismiss_silent(&mut self) -> Result<Option<End>, TopicError> {
-        if self.file.options.clock == Clock::Lockstep {
-            return Ok(None);
-        }
-        let Some(role) = self.watch.silent_for(self.plan.silence_limit) else {
-            return Ok(None);
-        };
-        let seconds = self.plan.silence_limit.as_secs_f64();
-        let words = format!("{role} was silent for {seconds} s and was killed");
-        for one in self.participants.iter_mut().filter(|one| one.role == role) {
-            one.kill();
-        }
-        let Role::Robot(index) = role else {
-            return Ok(Some(End::Lost(words)));
-        };
-        self.participants.retain(|one| one.role != role);
-        self.watch.forget(role);
-        self.node.try_cleanup_dead_nodes();
-        self.ask(ControlKind::Down, RoleKind::Robot, index)?;
-        self.notes.push(words);
         Ok(None)
     }
 
+    /// Writes down when the number of open tasks has changed.
+    fn note_tasks(&mut self) {
+        let tasks = self.watch.open_tasks();
+        if let Some(tasks) = tasks.filter(|_| tasks != self.open_tasks) {
+            self.open_tasks = Some(tasks);
+            self.diary.note(Happened::Open { tasks });
+        }
+    }
+
     /// Tells the world.
-    fn ask(&mut self, kind: ControlKind, role: RoleKind, index: u32) -> Result<(), TopicError> {
+    fn ask(
+        &mut self,
+        kind: ControlKind,
+        role: RoleKind,
+        index: u32,
+        incarnation: u32,
+    ) -> Result<(), TopicError> {
         self.requests += 1;
         let request = ControlRequest {
             id: self.requests,
             kind: kind.code(),
             role: role.code(),
             index,
-            incarnation: FIRST_INCARNATION,
+            incarnation,
             ..ControlRequest::default()
         };
         self.watch.ask(request)
     }
+}
+
+/// Holds what a run needs against what there is.
+fn reserve(topics: &Topics, counts: Counts, options: &RunOptions) -> Result<(), ResourceError> {
+    let participants = u64::from(counts.robots + options.monitors) + 5;
+    shared_memory::reserve(topics.bytes(), participants)
 }
 
 /// Their names, for people.

@@ -25,7 +25,7 @@ pub(crate) trait Message: FromBytes + IntoBytes + Immutable + KnownLayout + 'sta
 macro_rules! messages {
     ($($message:ident),+ $(,)?) => {
         $(impl Message for $message {
-            const TYPE_NAME: &'static str = concat!("rearrange/", stringify!($message), "/v2");
+            const TYPE_NAME: &'static str = concat!("rearrange/", stringify!($message), "/v3");
         })+
     };
 }

@@ -51,6 +51,11 @@ const TICKS_TO_ADOPT: u64 = 10;
 /// have not reached.
 const TICKS_TO_REPEAT: u64 = 100;
 
+/// Versions that one planner process can publish before the next one starts above them.
+const VERSIONS: u32 = 1 << 16;
+/// Planner processes whose versions are told apart so.
+const MOST_PROCESSES: u32 = (1 << 15) - 1;
+
 /// What is being worked on.
 #[derive(Clone, Copy, Debug)]
 enum Job {
@@ -90,6 +95,9 @@ pub struct Planner {
     schedule: Option<Box<Schedule>>,
     /// Its version when it was published last; 0 if it never was.
     schedule_version: u32,
+    /// What is published has versions past this one: a planner before may have published some
+    /// that are not in force yet.
+    versions_past: u32,
     /// Version of the scene that all of this is about.
     scene_version: u32,
     /// Who makes it.
@@ -126,11 +134,23 @@ impl Planner {
             dropped: 0,
             schedule: settings.method.plans_ahead().then(zeroed),
             schedule_version: 0,
+            versions_past: 0,
             scene_version: 0,
             anytime: (settings.method.plans_ahead()).then(|| Anytime::new(&settings)),
             standing: Standing::Idle(Verdict::Open),
             counters: Counters::default(),
             journal: StateHash::new(),
+        }
+    }
+
+    /// A planner in the place of one that is gone, as process `incarnation`, from 1. Nothing it
+    /// publishes has a version that one before it has used.
+    #[must_use]
+    pub fn succeeding(scene: &Scene, settings: Settings, incarnation: u32) -> Self {
+        let versions_past = incarnation.saturating_sub(1).min(MOST_PROCESSES) * VERSIONS;
+        Self {
+            versions_past,
+            ..Self::new(scene, settings)
         }
     }
 
@@ -250,7 +270,8 @@ impl Planner {
             return false;
         }
         self.standing = Standing::Idle(Verdict::Open);
-        schedule.version = in_force.max(self.schedule_version) + 1;
+        let last = in_force.max(self.schedule_version);
+        schedule.version = last.max(self.versions_past) + 1;
         schedule.effect_tick = header.tick + 1;
         self.schedule_version = schedule.version;
         schedule.hash_into(&mut self.journal);
@@ -266,6 +287,7 @@ impl Planner {
             table: std::mem::replace(&mut self.table, zeroed()),
             schedule: self.schedule.take(),
             schedule_version: self.schedule_version,
+            versions_past: self.versions_past,
             scene_version: snapshot.header.scene_version,
             tick: self.tick,
             anytime: self.anytime.take(),
@@ -430,9 +452,10 @@ impl Planner {
             hard,
             table,
             dropped,
+            versions_past,
             ..
         } = self;
-        table.version += 1;
+        table.version = table.version.max(*versions_past) + 1;
         table.effect_tick = effect_tick;
         let mut count = 0;
         hard.for_each(|constraint| {

@@ -378,6 +378,11 @@ impl Validate for RecorderReport {
                 what: "the number of lost batches",
             });
         }
+        if self.durable_sequence > self.next_sequence {
+            return Err(Invalid::Inconsistent {
+                what: "how much is in the file",
+            });
+        }
         Ok(())
     }
 }

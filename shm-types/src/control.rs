@@ -35,6 +35,9 @@ tag! {
         Resume = 4,
         /// The scene is to change.
         Change = 5,
+        /// Robot `index` takes part no more, but its process `incarnation` is there and can: `Up`
+        /// without an incarnation lets it.
+        Standby = 6,
     }
 }
 

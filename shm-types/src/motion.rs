@@ -121,6 +121,9 @@ pub struct MotionBatch {
     pub motion_count: u32,
     /// Live events.
     pub event_count: u32,
+    /// Oldest batch that can still be sent again: whoever lacks an older one has lost it, and
+    /// whoever lacks a newer one will get it.
+    pub kept_from: u64,
     /// The first `motion_count` are live.
     pub motions: [MotionRecord; MAX_MOTIONS],
     /// The first `event_count` are live.
@@ -136,6 +139,8 @@ pub struct MotionBatch {
 pub struct RecorderReport {
     /// Number of the batch it expects next: all before it are written or lost.
     pub next_sequence: u64,
+    /// All batches before this one are in the file whatever becomes of the process, or lost.
+    pub durable_sequence: u64,
     /// Batches that never reached it.
     pub lost: u64,
     /// Incarnation of its process.
@@ -164,6 +169,19 @@ impl MotionBatch {
     #[must_use]
     pub fn motions(&self) -> &[MotionRecord] {
         &self.motions[..(self.motion_count as usize).min(MAX_MOTIONS)]
+    }
+
+    /// Copies the live part of `other`.
+    pub fn copy_from(&mut self, other: &Self) {
+        let (motions, events) = (other.motions(), other.events());
+        self.sequence = other.sequence;
+        self.tick = other.tick;
+        self.time_ns = other.time_ns;
+        self.motion_count = other.motion_count;
+        self.event_count = other.event_count;
+        self.kept_from = other.kept_from;
+        self.motions[..motions.len()].copy_from_slice(motions);
+        self.events[..events.len()].copy_from_slice(events);
     }
 
     /// The live events.

@@ -1,4 +1,4 @@
-//! `rearrange list`: the runs of this user that are alive.
+//! `rearrange list`: the runs of this user that are alive, or can be resumed.
 
 use node::options::Clock;
 
@@ -6,10 +6,10 @@ use crate::cli::ListArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::{output, table};
 
-/// Prints a line for each live run; nothing at all if there is none.
+/// Prints a line for each run; nothing at all if there is none.
 pub(crate) fn main(args: &ListArgs) -> Outcome {
     let runs = node::domain::list()
-        .map_err(|error| Failure::system(format!("the live runs cannot be listed: {error}")))?;
+        .map_err(|error| Failure::system(format!("the runs cannot be listed: {error}")))?;
     if args.json {
         output::print_json(&runs)?;
         return Ok(Exit::Success);
@@ -22,6 +22,7 @@ pub(crate) fn main(args: &ListArgs) -> Outcome {
     table.set_header([
         "ID",
         "NAME",
+        "STATE",
         "SCENARIO",
         "ROBOTS",
         "CLOCK",
@@ -32,10 +33,20 @@ pub(crate) fn main(args: &ListArgs) -> Outcome {
         table.add_row([
             run.id.clone(),
             run.name.clone(),
+            if run.live {
+                "live"
+            } else {
+                "dead, can be resumed"
+            }
+            .to_owned(),
             run.scenario.clone(),
             run.robots.to_string(),
             clock(run.clock).to_owned(),
-            run.supervisor_pid.to_string(),
+            if run.live {
+                run.supervisor_pid.to_string()
+            } else {
+                "-".to_owned()
+            },
             run.directory.display().to_string(),
         ]);
     }

@@ -4,10 +4,14 @@
 //! Not responsible for: parsing (`cli`).
 
 mod bench;
+mod chaos;
 mod check;
+mod doctor;
 mod explain;
+mod gc;
 mod generate;
 mod list;
+mod resume;
 mod roles;
 mod run;
 mod scenarios;
@@ -51,6 +55,10 @@ fn dispatch(command: Command) -> Outcome {
         Command::Validate(args) => validate::main(&args),
         Command::Scenarios(args) => scenarios::main(&args),
         Command::List(args) => list::main(&args),
+        Command::Resume(args) => resume::main(&args),
+        Command::Gc(args) => gc::main(&args),
+        Command::Doctor(args) => doctor::main(&args),
+        Command::Chaos(args) => chaos::main(&args),
         Command::Tell(args) => tell::main(&args),
         Command::Simulate(args) => simulate::main(&args),
         Command::Bench(args) => bench::main(&args.workload),

@@ -11,10 +11,10 @@ use crate::exit::{Exit, Failure, Outcome};
 /// Takes part in a run until it ends.
 pub(crate) fn main(role: Role, args: &RoleArgs) -> Outcome {
     match role {
-        Role::World => roles::world::main(&args.run),
-        Role::Planner => roles::planner::main(&args.run),
-        Role::Robot(index) => roles::robot::main(&args.run, index),
-        Role::Recorder => roles::recorder::main(&args.run),
+        Role::World => roles::world::main(&args.run, args.incarnation),
+        Role::Planner => roles::planner::main(&args.run, args.incarnation),
+        Role::Robot(index) => roles::robot::main(&args.run, index, args.incarnation),
+        Role::Recorder => roles::recorder::main(&args.run, args.incarnation),
     }
     .map(|()| Exit::Success)
     .map_err(|error| Failure::system(format!("{role}: {error}")))

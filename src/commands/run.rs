@@ -32,21 +32,36 @@ pub(crate) fn main(args: &RunArgs) -> Outcome {
     };
     let frame = RunResult {
         seed,
-        ..frame(&scene, args, &options)
+        ..frame(&scene, driver(args), &options)
     };
     let result = match planner::certificate(&scene) {
         Some(certificate) => infeasible(frame, &Proof::Certificate(certificate)),
         None => {
             let finished = drive(&scene, args, options)?;
-            complete(frame, &scene, args, finished)
+            complete(frame, &scene, finished)
         }
     };
-    if args.json {
-        output::print_json(&result)?;
+    tell(&result, args.json)
+}
+
+/// Prints a result.
+pub(crate) fn tell(result: &RunResult, json: bool) -> Outcome {
+    if json {
+        output::print_json(result)?;
     } else {
-        output::print(&table::render(&result, output::wants_colour()))?;
+        output::print(&table::render(result, output::wants_colour()))?;
     }
     Ok(result.outcome.exit())
+}
+
+/// The driver of processes, as results name it.
+pub(crate) const PROCESSES: &str = "processes";
+
+const fn driver(args: &RunArgs) -> &'static str {
+    match args.process.driver {
+        Driver::InProcess => "in-process",
+        Driver::Processes => PROCESSES,
+    }
 }
 
 fn changes_of(args: &RunArgs) -> Result<Vec<ToldAt>, Failure> {
@@ -77,16 +92,14 @@ fn drive(scene: &Scene, args: &RunArgs, options: RunOptions) -> Result<Finished,
     let mut progress = Progress::new(goals.count());
     let finished = match args.process.driver {
         Driver::InProcess => in_process::run(scene, &options, &progress),
-        Driver::Processes => {
-            processes::run(scene, args.process.name.clone(), options, &mut progress)
-        }
+        Driver::Processes => processes::run(scene, &args.process, options, &mut progress),
     };
     progress.clear();
     finished
 }
 
 /// A result that says what was asked for, and nothing yet of what came out.
-fn frame(scene: &Scene, args: &RunArgs, options: &RunOptions) -> RunResult {
+pub(crate) fn frame(scene: &Scene, driver: &'static str, options: &RunOptions) -> RunResult {
     RunResult {
         schema_version: result::SCHEMA_VERSION,
         program_version: env!("CARGO_PKG_VERSION"),
@@ -102,10 +115,7 @@ fn frame(scene: &Scene, args: &RunArgs, options: &RunOptions) -> RunResult {
         method: options.settings.method.word().to_owned(),
         robots: scene.homes.len(),
         objects: scene.objects.len(),
-        driver: match args.process.driver {
-            Driver::InProcess => "in-process",
-            Driver::Processes => "processes",
-        },
+        driver,
         outcome: Ending::Failed,
         reason: None,
         makespan_s: None,
@@ -137,7 +147,8 @@ fn infeasible(frame: RunResult, proof: &Proof) -> RunResult {
     }
 }
 
-fn complete(frame: RunResult, scene: &Scene, args: &RunArgs, finished: Finished) -> RunResult {
+/// The result of a run that has taken place.
+pub(crate) fn complete(frame: RunResult, scene: &Scene, finished: Finished) -> RunResult {
     let world = &finished.world;
     let times = Times::new(&world.activities, frame.options.run.settings.tick_ns);
     let mut notes = finished.notes.clone();
@@ -172,7 +183,7 @@ fn complete(frame: RunResult, scene: &Scene, args: &RunArgs, finished: Finished)
         state_hash: hex(world.state_hash),
         wall_s: finished.wall_s,
         oversubscribed: finished.oversubscribed,
-        trace: args.trace.as_ref().map(|path| path.display().to_string()),
+        trace: (frame.options.run.trace.as_ref()).map(|path| path.display().to_string()),
         notes,
         ..frame
     }

@@ -51,7 +51,7 @@ fn told(what: &What) -> Result<Told, String> {
         }),
         What::Open { at } => change(Change::Open { at: place(at) }),
         What::Lose { robot } => Ok(Told::Lose(*robot)),
-        What::Back { robot } => Ok(Told::Back(*robot)),
+        What::Back { robot } | What::Release { robot } => Ok(Told::Back(*robot)),
     }
 }
 
@@ -95,6 +95,7 @@ fn words(what: &What) -> String {
         What::Close { .. } => "there is a wall".to_owned(),
         What::Open { .. } => "the wall is gone".to_owned(),
         What::Lose { robot } => format!("robot {robot} takes part no more"),
+        What::Release { robot } => format!("robot {robot} may move again"),
         What::Back { robot } => format!("robot {robot} takes part again"),
     }
 }

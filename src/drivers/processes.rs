@@ -4,7 +4,10 @@
 //! Not responsible for: the processes.
 
 use std::env;
+use std::time::Duration;
 
+use node::domain::{DomainError, RunFile};
+use node::options::Recovery;
 use node::{Launcher, RunError, RunOptions, RunPlan, RunReport, supervisor};
 use scene::Scene;
 
@@ -12,22 +15,59 @@ use crate::drivers::Finished;
 use crate::exit::{Exit, Failure};
 use crate::progress::Progress;
 use crate::result::RoleLine;
+use crate::run_options::ProcessArgs;
 
-/// Runs `scene` to its end as the run called `name`.
+/// Runs `scene` to its end, as `process` says.
 ///
 /// # Errors
 /// The run cannot be started.
 pub(crate) fn run(
     scene: &Scene,
-    name: Option<String>,
+    process: &ProcessArgs,
     options: RunOptions,
     progress: &mut Progress,
 ) -> Result<Finished, Failure> {
     let plan = RunPlan {
-        name,
+        name: process.name.clone(),
+        recovery: Recovery {
+            restart: process.restart,
+            give_up_after: process.give_up_after,
+        },
+        silence_limit: Duration::from_secs_f64(process.silence_limit),
         ..plan(scene, options)?
     };
     let report = supervisor::run(&plan, progress).map_err(refused)?;
+    Ok(checked(report))
+}
+
+/// Goes on with the run of this id or name; its scene, its options and what came of it.
+///
+/// # Errors
+/// There is none that can be gone on with.
+pub(crate) fn resume(
+    run: &str,
+    progress: &mut Progress,
+) -> Result<(Scene, RunOptions, Finished), Failure> {
+    let launcher = launcher()?;
+    let mut planned = None;
+    let plan = |file: &RunFile, scenario: String| {
+        let plan = RunPlan {
+            name: Some(file.name.clone()),
+            recovery: file.recovery,
+            silence_limit: Duration::from_secs_f64(file.silence_limit_s),
+            ..RunPlan::new(scenario, file.options.clone(), launcher)
+        };
+        planned = Some((plan.scenario.clone(), plan.options.clone()));
+        plan
+    };
+    let report = supervisor::resume(run, plan, progress).map_err(refused)?;
+    let (scenario, options) = planned.ok_or_else(|| Failure::system("the run has no plan"))?;
+    let scene = scene::parse(&scenario, "scenario.toml").map_err(Failure::system)?;
+    Ok((scene, options, checked(report)))
+}
+
+/// What is left of a run, with what the checker says of its trace.
+fn checked(report: RunReport) -> Finished {
     let check = report.trace.as_deref().map(trace::check_file).transpose();
     let mut finished = finished(report);
     match check {
@@ -36,7 +76,7 @@ pub(crate) fn run(
             .notes
             .push(format!("the trace cannot be checked: {error}")),
     }
-    Ok(finished)
+    finished
 }
 
 /// A plan whose roles are this very program.
@@ -66,6 +106,7 @@ pub(crate) fn launcher() -> Result<Launcher, Failure> {
 pub(crate) fn refused(error: RunError) -> Failure {
     let exit = match error {
         RunError::Options(_) => Exit::Usage,
+        RunError::Domain(DomainError::NotResumable { .. } | DomainError::Live(_)) => Exit::BadInput,
         _ => Exit::System,
     };
     Failure::new(exit, error)

@@ -28,4 +28,4 @@ pub use reader::{Close, ReadError, Reader, Span};
 pub use record::SceneRecord;
 pub use replay::{Frame, Replay};
 pub use view::{Cause, Standing, Story, page, standing, still};
-pub use writer::{Ending, WriteError, Writer};
+pub use writer::{Ending, Resumed, WriteError, Writer};

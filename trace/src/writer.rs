@@ -9,13 +9,14 @@
 //! of motion so far has been written: up to the last whole chunk nothing is missing.
 
 use std::collections::BTreeMap;
-use std::io::Write;
+use std::io::{Read, Write};
 
-use mcap::records::MessageHeader;
+use mcap::records::{MessageHeader, Record as Raw, op};
 use mcap::write::NoSeek;
 use shm_types::{Checked, Counts, Invalid, MotionBatch, WorldSnapshot};
 
 use crate::channel::{Channel, ENCODING, PROFILE, SCHEMA_ENCODING};
+use crate::frames::Frames;
 use crate::merge::Pending;
 use crate::record::{BodyKind, End, Gap, Mark, Motion, Outcome, SceneRecord};
 use crate::wire;
@@ -53,6 +54,61 @@ pub struct Ending {
     pub makespan_ns: u64,
     /// All options of the command that ran it.
     pub options: serde_json::Value,
+}
+
+/// What a trace that is gone on with has told so far.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Resumed {
+    /// Number of the batch it lacks next.
+    pub next_sequence: u64,
+    /// How often the scene has changed.
+    pub scene_version: u32,
+    /// Hash of the version in force, as the record has it.
+    pub scenario_hash: String,
+}
+
+/// The records of a trace behind its first scene, up to its last mark.
+struct ReadBack {
+    messages: Vec<(Channel, u64, Vec<u8>)>,
+    last: Mark,
+}
+
+/// Reads what is whole of a trace of the run `run_id`.
+fn read_back(old: impl Read, run_id: &str) -> Option<ReadBack> {
+    let mut frames = Frames::new(old).ok()?;
+    let mut channels = BTreeMap::new();
+    let mut messages = Vec::new();
+    let (mut first, mut marked) = (None, None);
+    // Whatever the end of the file is like, what is before it counts.
+    while let Ok(Some((opcode, body))) = frames.next() {
+        match mcap::parse_record(opcode, &body) {
+            Ok(Raw::Channel(channel)) if opcode == op::CHANNEL => {
+                channels.insert(channel.id, Channel::of_topic(&channel.topic));
+            }
+            Ok(Raw::Message { header, data }) => {
+                let channel = channels.get(&header.channel_id).copied().flatten()?;
+                if channel == Channel::End {
+                    break;
+                }
+                if first.is_none() {
+                    let scene: SceneRecord = serde_json::from_slice(&data).ok()?;
+                    first = (scene.run_id == run_id).then_some(());
+                    first?;
+                    continue;
+                }
+                messages.push((channel, header.log_time, data.into_owned()));
+                if channel == Channel::Mark
+                    && let Ok(mark) = serde_json::from_slice::<Mark>(&messages.last()?.2)
+                {
+                    marked = Some((messages.len(), mark));
+                }
+            }
+            _ => {}
+        }
+    }
+    let (count, last) = marked?;
+    messages.truncate(count);
+    Some(ReadBack { messages, last })
 }
 
 /// Writes one trace.
@@ -133,6 +189,52 @@ impl<W: Write> Writer<W> {
         self.write(Channel::Scene, self.last.time_ns, scene)
     }
 
+    /// Goes on with a trace of the same run that breaks off, or that has ended: copies all of it
+    /// up to its last mark. `None` if there is nothing of it that could be gone on with.
+    ///
+    /// # Errors
+    /// The new file cannot be written.
+    pub fn go_on(
+        old: impl Read,
+        out: W,
+        scene: &SceneRecord,
+        state_every_ns: u64,
+    ) -> Result<Option<(Self, Resumed)>, WriteError> {
+        let Some(found) = read_back(old, &scene.run_id) else {
+            return Ok(None);
+        };
+        let mut writer = Self::new(out, scene, state_every_ns)?;
+        let mut resumed = Resumed {
+            next_sequence: found.last.tick,
+            scene_version: 0,
+            scenario_hash: scene.scenario_hash.clone(),
+        };
+        // The first is the mark that the new file begins with, too.
+        for (channel, time_ns, json) in found.messages.iter().skip(1) {
+            if *channel == Channel::Scene {
+                if let Ok(newer) = serde_json::from_slice::<SceneRecord>(json) {
+                    writer.counts = counts(&newer);
+                    writer.robots.resize_with(newer.homes.len(), || None);
+                    writer.objects.resize_with(newer.objects.len(), || None);
+                    resumed.scene_version += 1;
+                    resumed.scenario_hash = newer.scenario_hash;
+                }
+            } else if *channel == Channel::Gap
+                && let Ok(gap) = serde_json::from_slice::<Gap>(json)
+            {
+                writer.missing += gap.batches;
+            }
+            writer.write_json(*channel, *time_ns, json)?;
+        }
+        writer.next_sequence = found.last.tick;
+        writer.last = found.last;
+        writer.marked = Some(found.last);
+        let every = state_every_ns.max(1);
+        writer.state_due_ns = (found.last.time_ns / every).saturating_mul(every);
+        writer.flush()?;
+        Ok(Some((writer, resumed)))
+    }
+
     fn open(&mut self, channel: Channel) -> Result<(), WriteError> {
         let (name, schema) = channel.schema();
         let topic = channel.topic();
@@ -160,7 +262,19 @@ impl<W: Write> Writer<W> {
             channel: topic,
             source,
         })?;
-        let (id, sequence) = self.channels.entry(topic).or_default();
+        let json = std::mem::take(&mut self.json);
+        let written = self.write_json(channel, time_ns, &json);
+        self.json = json;
+        written
+    }
+
+    fn write_json(
+        &mut self,
+        channel: Channel,
+        time_ns: u64,
+        json: &[u8],
+    ) -> Result<(), WriteError> {
+        let (id, sequence) = self.channels.entry(channel.topic()).or_default();
         let header = MessageHeader {
             channel_id: *id,
             sequence: *sequence,
@@ -168,8 +282,8 @@ impl<W: Write> Writer<W> {
             publish_time: time_ns,
         };
         *sequence = sequence.wrapping_add(1);
-        self.chunk_bytes += self.json.len();
-        Ok(self.file.write_to_known_channel(&header, &self.json)?)
+        self.chunk_bytes += json.len();
+        Ok(self.file.write_to_known_channel(&header, json)?)
     }
 
     /// Adds the motion and events of one tick. A batch that comes again is ignored; when batches

@@ -394,6 +394,56 @@ fn a_writer_that_is_dropped_leaves_a_file_that_reads() {
     );
 }
 
+/// A recorder that is started again has what its predecessor flushed, and gets the rest again.
+#[test]
+fn a_trace_that_broke_off_is_gone_on_with_as_if_it_had_not() {
+    let whole = short_run();
+    let chunks: Vec<usize> = (1..whole.len()).step_by(97).collect();
+    let mut gone_on_with = 0;
+    for cut in chunks {
+        let old = &whole[..cut];
+        let made = Writer::go_on(old, Cursor::new(Vec::new()), &scene(), 500_000_000).unwrap();
+        let Some((writer, resumed)) = made else {
+            continue;
+        };
+        gone_on_with += 1;
+        assert_eq!(resumed.scene_version, 0);
+        let mut writer = Some(writer);
+        // The batches come again, from a little before those that are lacking.
+        let from = resumed.next_sequence.saturating_sub(10);
+        let again = written(|sequence, other| {
+            if sequence == from
+                && let Some(writer) = writer.take()
+            {
+                *other = writer;
+            }
+            sequence >= from
+        });
+        let report = check(&again).unwrap();
+        assert!(!report.truncated && report.complete, "{cut}");
+        assert!(
+            report.violations.is_empty(),
+            "{cut}: {:?}",
+            report.violations
+        );
+        let frames = |bytes: &[u8]| {
+            let replay = Replay::new(
+                Reader::new(Cursor::new(bytes.to_vec())).unwrap(),
+                0,
+                33_333_333,
+            );
+            let frames: Vec<String> = replay.map(|f| format!("{:.9?}", f.unwrap())).collect();
+            frames
+        };
+        assert_eq!(frames(&whole), frames(&again), "{cut}");
+    }
+    assert!(gone_on_with > 20, "{gone_on_with}");
+    let mut foreign = scene();
+    foreign.run_id = "02".to_owned();
+    let made = Writer::go_on(&*whole, Cursor::new(Vec::new()), &foreign, 0).unwrap();
+    assert!(made.is_none(), "a file of another run");
+}
+
 #[test]
 fn what_is_no_trace_is_refused_with_the_way_out() {
     let said = |bytes: &[u8]| check(bytes).unwrap_err().to_string();

@@ -341,6 +341,15 @@ impl World {
         checksum.save(out);
     }
 
+    /// Hash of the scene that `bytes` are a state of, if they are one at all.
+    #[must_use]
+    pub fn scene_of(bytes: &[u8]) -> Option<u64> {
+        let mut from = Reader(bytes);
+        (from.take(MAGIC.len()).ok()? == MAGIC).then_some(())?;
+        (u32::restore(&mut from).ok()? == VERSION).then_some(())?;
+        u64::restore(&mut from).ok()
+    }
+
     /// The world that was saved as `bytes`, in the version of the scene that was in force then.
     /// All memory that it will ever use is allocated here.
     ///
@@ -529,6 +538,7 @@ mod tests {
         let mut again = Vec::new();
         world.save(&mut again);
         assert!(bytes == again);
+        assert_eq!(World::scene_of(&bytes), Some(bench.scene.hash));
         let mut snapshot: Box<shm_types::WorldSnapshot> = shm_types::zeroed();
         world.snapshot_into(&mut snapshot);
         assert_eq!(snapshot.header.state_hash, bench.header().state_hash);

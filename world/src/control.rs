@@ -36,7 +36,8 @@ impl World {
         if self.outcome != Outcome::Running {
             return Some(NotMade::Over.to_string());
         }
-        if !matches!(kind, ControlKind::Up | ControlKind::Down) || role != RoleKind::Robot {
+        let about_robots = [ControlKind::Up, ControlKind::Down, ControlKind::Standby];
+        if !about_robots.contains(&kind) || role != RoleKind::Robot {
             return None;
         }
         let (index, count) = (request.index, self.robots.len());
@@ -49,7 +50,7 @@ impl World {
         match kind {
             ControlKind::Down if !link.live => Some(format!("robot {index} is gone already")),
             // Of a process that is no more: it may have been told late.
-            ControlKind::Down | ControlKind::Up
+            ControlKind::Down | ControlKind::Up | ControlKind::Standby
                 if (1..link.incarnation).contains(&request.incarnation) =>
             {
                 Some(format!("a later process of robot {index} takes part"))
@@ -77,11 +78,15 @@ impl World {
                     self.robot_up(i, request.incarnation.max(last), journal);
                 }
                 (ControlKind::Down, Some(i)) => self.robot_down(i, journal),
+                (ControlKind::Standby, Some(i)) => {
+                    self.robot_stands_by(i, request.incarnation, journal);
+                }
                 (ControlKind::Stop, _) => self.stopped = true,
                 (ControlKind::Hold, _) => self.hold(true, journal),
                 (ControlKind::Resume, _) => self.hold(false, journal),
                 // Other roles hold no bodies: that one is silent is seen from its messages.
-                (ControlKind::Up | ControlKind::Down, None) | (ControlKind::Change, _) => {}
+                (ControlKind::Up | ControlKind::Down | ControlKind::Standby, None)
+                | (ControlKind::Change, _) => {}
             }
         }
     }
@@ -114,6 +119,20 @@ impl World {
         self.robots[i].link.live = false;
         self.epoch.due = true;
         journal.event(Event::new(EventKind::RobotDown).robot(i));
+    }
+
+    /// Robot `i` is gone until somebody lets its next process take part.
+    fn robot_stands_by(&mut self, i: usize, incarnation: u32, journal: &mut Journal<'_>) {
+        self.robot_down(i, journal);
+        let link = &mut self.robots[i].link;
+        if incarnation > link.incarnation {
+            *link = Link {
+                live: false,
+                ..Link::new(incarnation)
+            };
+            self.robots[i].request = 0;
+            self.robots[i].last_failure = 0;
+        }
     }
 
     /// Leaves what robot `i` has to its next process. Others may have passed where they wait for
@@ -252,6 +271,29 @@ mod tests {
         bench.steps(5);
         assert!(bench.at(1)[0] > 1.0);
         assert_eq!(bench.robot(1).acknowledged, 5);
+    }
+
+    #[test]
+    fn a_robot_that_stands_by_moves_only_once_it_is_let() {
+        let mut bench = bench("");
+        bench.ask(1, &[[8.0, 0.5]]);
+        bench.steps(5);
+        bench.tell(ControlKind::Standby, 1, 2);
+        bench.commands[1].incarnation = 2;
+        bench.commands[1].sequence = 0;
+        bench.step();
+        let stands = bench.robot(1);
+        assert_eq!((stands.live, stands.incarnation), (0, 2));
+        assert_eq!(bench.events(EventKind::RobotDown).len(), 1);
+        let at = bench.at(1);
+        bench.ask(1, &[[8.0, 0.5]]);
+        bench.steps(5);
+        assert_eq!(bench.at(1), at, "it is not asked to move yet");
+        bench.tell(ControlKind::Up, 1, 0);
+        bench.steps(5);
+        let up = bench.robot(1);
+        assert_eq!((up.live, up.incarnation), (1, 2));
+        assert!(bench.at(1)[0] > at[0]);
     }
 
     #[test]

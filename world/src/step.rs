@@ -285,6 +285,15 @@ impl World {
         self.outcome
     }
 
+    /// Which process of `robot` is listened to.
+    ///
+    /// # Panics
+    /// When there is no such robot.
+    #[must_use]
+    pub fn incarnation(&self, robot: usize) -> u32 {
+        self.robots[robot].link.incarnation
+    }
+
     /// How often the scene was changed.
     #[must_use]
     pub const fn scene_version(&self) -> u32 {

@@ -12,7 +12,7 @@ use shm_types::Counts;
 use shm_types::capacity::LAYOUT_VERSION;
 
 use crate::domain::{DomainError, RUN_FILE, SCENARIO_FILE, file_error, put};
-use crate::options::{Role, RunOptions};
+use crate::options::{Recovery, Role, RunOptions};
 
 /// `run.json`: what every process of the run starts from, and monitors find it by.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,6 +43,10 @@ pub struct RunFile {
     pub processes: Vec<Process>,
     /// What the run was asked to be.
     pub options: RunOptions,
+    /// What is done about processes that die.
+    pub recovery: Recovery,
+    /// How long a participant may be silent before it is killed, s.
+    pub silence_limit_s: f64,
 }
 
 /// One process of a run.
@@ -52,6 +56,8 @@ pub struct Process {
     pub role: Role,
     /// Its process id.
     pub pid: u32,
+    /// Which process of this participant it is, from 1.
+    pub incarnation: u32,
 }
 
 impl RunFile {

@@ -1,7 +1,7 @@
 //! The directory of all runs of a user.
 //!
 //! Responsible for: where it is, that nobody else can enter it, which runs in it are live, and
-//! sweeping away what dead ones have left.
+//! sweeping away what dead ones have left in shared memory.
 //! Not responsible for: what is in a run's own directory (`domain`).
 
 use std::fs::{self, DirBuilder, File, OpenOptions};
@@ -22,6 +22,13 @@ const ID_DIGITS: usize = 8;
 /// Bytes of a run's directory and prefix past the directory of all runs: `/ID` and `rrID_`.
 const ROOT_AND_PREFIX_TAIL: usize = 1 + ID_DIGITS + 2 + ID_DIGITS + 1;
 
+/// All runs of a user, each by id.
+#[derive(Debug, Default)]
+pub(super) struct All {
+    pub(super) live: Vec<RunFile>,
+    pub(super) dead: Vec<RunFile>,
+}
+
 /// The directory of all runs of this user, locked against other starts and lists.
 pub(super) struct Runs {
     path: PathBuf,
@@ -41,10 +48,11 @@ impl Runs {
         Ok(Self { path, _lock: lock })
     }
 
-    /// Reads live runs and removes dead ones. A directory is made and locked while the directory
-    /// of all runs is locked, so one without a lock has no supervisor.
-    pub(super) fn live(&self) -> Result<Vec<RunFile>, DomainError> {
-        let mut runs = Vec::new();
+    /// Reads all runs, and removes what dead ones have in shared memory; of one that never came to
+    /// be, the directory too. A directory is made and locked while the directory of all runs is
+    /// locked, so one without a lock has no supervisor.
+    pub(super) fn all(&self) -> Result<All, DomainError> {
+        let mut runs = All::default();
         let entries = fs::read_dir(&self.path).map_err(|e| file_error(&self.path, e))?;
         for entry in entries {
             let entry = entry.map_err(|e| file_error(&self.path, e))?;
@@ -54,18 +62,40 @@ impl Runs {
             };
             let directory = entry.path();
             if is_locked(&directory.join(LOCK_FILE)) {
-                runs.extend(RunFile::read(&directory).ok());
+                runs.live.extend(RunFile::read(&directory).ok());
                 continue;
             }
-            tracing::info!("removing what the dead run {id} has left");
             // Its processes die with their supervisor; one that has just done so may still be at
             // it, and is gone by the next start.
             shared_memory::remove_all(&prefix(id))
                 .map_err(|e| file_error(Path::new(shared_memory::SHARED_MEMORY), e))?;
-            fs::remove_dir_all(&directory).map_err(|e| file_error(&directory, e))?;
+            match RunFile::read(&directory) {
+                Ok(run) => runs.dead.push(run),
+                Err(_) => {
+                    tracing::info!("removing what run {id} has left, which never began");
+                    fs::remove_dir_all(&directory).map_err(|e| file_error(&directory, e))?;
+                }
+            }
         }
-        runs.sort_by(|a: &RunFile, b| a.id.cmp(&b.id));
+        runs.live.sort_by(|a, b| a.id.cmp(&b.id));
+        runs.dead.sort_by(|a, b| a.id.cmp(&b.id));
         Ok(runs)
+    }
+
+    /// Takes the lock of a dead run.
+    pub(super) fn lock_again(&self, run: &RunFile) -> Result<RunDirectory, DomainError> {
+        let path = self.path.join(&run.id);
+        let lock_path = path.join(LOCK_FILE);
+        let lock = || -> io::Result<File> {
+            let lock = OpenOptions::new().write(true).open(&lock_path)?;
+            flock(&lock, FlockOperation::NonBlockingLockExclusive)?;
+            Ok(lock)
+        };
+        Ok(RunDirectory {
+            prefix: prefix(&run.id),
+            _lock: lock().map_err(|e| file_error(&lock_path, e))?,
+            path,
+        })
     }
 
     pub(super) fn make_directory(&self) -> Result<(RunDirectory, String), DomainError> {

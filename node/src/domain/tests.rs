@@ -22,12 +22,14 @@ fn create(runs: &Path, name: Option<&str>) -> Result<(RunDirectory, RunFile), Do
         },
         shared_memory_bytes: 3,
         options: &RunOptions::new(Settings::default()),
+        recovery: Recovery::default(),
+        silence_limit_s: 1.0,
     };
     RunDirectory::create_in(runs.join("runs"), &new)
 }
 
 fn live(runs: &Path) -> Vec<RunFile> {
-    Runs::open(runs.join("runs")).unwrap().live().unwrap()
+    Runs::open(runs.join("runs")).unwrap().all().unwrap().live
 }
 
 #[test]
@@ -59,7 +61,7 @@ fn a_live_name_is_refused_and_free_afterwards() {
 }
 
 #[test]
-fn what_a_dead_run_has_left_is_swept_away_and_nothing_else() {
+fn what_a_dead_run_has_in_shared_memory_is_swept_away_and_nothing_else() {
     let runs = runs();
     let (alive, _) = create(runs.path(), None).unwrap();
     let (dead, run) = create(runs.path(), None).unwrap();
@@ -72,7 +74,9 @@ fn what_a_dead_run_has_left_is_swept_away_and_nothing_else() {
     let RunDirectory { _lock, .. } = &dead;
     flock(_lock, FlockOperation::Unlock).unwrap();
     assert_eq!(live(runs.path()).len(), 1);
-    assert!(!path.exists() && !segment.exists());
+    assert!(path.exists() && !segment.exists(), "it can be resumed");
+    let all = Runs::open(runs.path().join("runs")).unwrap().all().unwrap();
+    assert_eq!(all.dead, [run]);
     assert!(alive.path().exists() && foreign.exists());
 }
 

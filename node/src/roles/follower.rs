@@ -8,6 +8,7 @@
 //! Terms: a *phase* is where in the world's period a participant's deadline lies, so that not all
 //! start at once.
 
+use shm_types::capacity::MAGIC;
 use shm_types::{Outcome, SnapshotHeader, WorldSnapshot};
 
 use crate::clock;
@@ -17,6 +18,14 @@ use crate::ports::{Access, Sample, Subscriber};
 use crate::roles::{RoleError, Seat};
 use crate::ticker::{Due, Ticker};
 use crate::wait::Waiter;
+
+/// What a follower has come to.
+pub(crate) enum Next {
+    /// A snapshot that it had not seen.
+    Snapshot(Sample<WorldSnapshot>),
+    /// The newest it had seen, from another world process: that one lacks the answer to it.
+    Again,
+}
 
 /// A reader of snapshots.
 pub(crate) struct Follower {
@@ -30,8 +39,9 @@ pub(crate) struct Follower {
     due: Option<Due>,
     /// What the age of a snapshot counts as.
     age: Timed,
-    /// Tick of the newest snapshot.
+    /// Tick of the newest snapshot, and which world process sent it, from 1.
     tick: u64,
+    generation: u32,
     skipped: u64,
 }
 
@@ -61,6 +71,7 @@ impl Follower {
                 _ => Timed::SnapshotAge,
             },
             tick: 0,
+            generation: 0,
             skipped: 0,
         })
     }
@@ -76,14 +87,12 @@ impl Follower {
     }
 
     /// The next snapshot, once it is time for it; `None` once the run is over or this process is
-    /// to end. The sample before it must have been dropped.
+    /// to end. The sample before it must have been dropped. Ticks never go back; one comes again
+    /// only from a world that was started again, and is then to be answered as before.
     ///
     /// # Errors
     /// Shared memory failed.
-    pub(crate) fn next(
-        &mut self,
-        seat: &mut Seat,
-    ) -> Result<Option<Sample<WorldSnapshot>>, RoleError> {
+    pub(crate) fn next(&mut self, seat: &mut Seat) -> Result<Option<Next>, RoleError> {
         if let Some(ticker) = &mut self.ticker {
             if !seat.is_warm() {
                 ticker.forget_misses();
@@ -103,13 +112,27 @@ impl Follower {
             let now_ns = clock::now_ns();
             self.waiter.arrived();
             let header = &sample.header;
+            if !self.goes_on(seat, header) {
+                continue;
+            }
             if header.outcome != Outcome::Running.code() {
                 return Ok(None);
             }
+            if self.generation > 0 && header.tick == self.tick {
+                self.generation = header.generation;
+                return Ok(Some(Next::Again));
+            }
             self.note(seat, header, now_ns);
-            return Ok(Some(sample));
+            return Ok(Some(Next::Snapshot(sample)));
         }
         Ok(None)
+    }
+
+    /// Whether a snapshot is of this run and no older than what came before it.
+    fn goes_on(&self, seat: &Seat, header: &SnapshotHeader) -> bool {
+        let is_of_run = header.magic == MAGIC && header.run_id == seat.run.id_number();
+        let now = (header.generation, header.tick);
+        is_of_run && now > (self.generation, self.tick) && header.tick >= self.tick
     }
 
     /// Notes when the snapshot with this header was first looked at.
@@ -117,10 +140,10 @@ impl Follower {
         let stamp_ns = header.publish_stamp_ns;
         let age_ns = now_ns.saturating_sub(stamp_ns);
         seat.latencies.record(self.age, age_ns);
-        if seat.is_warm() {
+        if seat.is_warm() && self.generation > 0 {
             self.skipped += header.tick.saturating_sub(self.tick + 1);
         }
-        self.tick = header.tick;
+        (self.generation, self.tick) = (header.generation, header.tick);
         if let (Some(due), Timed::SnapshotAge) = (&mut self.due, self.age) {
             for late_ns in due.came(stamp_ns, now_ns) {
                 seat.latencies.record(Timed::SnapshotLateness, late_ns);

@@ -35,6 +35,8 @@ use crate::topics::Topics;
 use crate::wait::Waiter;
 use crate::wakes::{Sleeper, Waker};
 
+/// The world's journal, in the run's directory.
+pub(crate) const JOURNAL_FILE: &str = "journal";
 /// The trace, in the run's directory, where no other place was asked for.
 pub(crate) const TRACE_FILE: &str = "trace.mcap";
 
@@ -82,6 +84,8 @@ pub enum RoleError {
 /// What every role has once it has joined.
 pub(crate) struct Seat {
     pub(crate) role: Role,
+    /// Which process of this participant it is, from 1.
+    pub(crate) incarnation: u32,
     pub(crate) run: RunFile,
     /// The scene in force, as far as this process has seen.
     pub(crate) scene: Scene,
@@ -100,11 +104,11 @@ pub(crate) struct Seat {
 }
 
 impl Seat {
-    /// Joins the run in `directory` as `role`.
+    /// Joins the run in `directory` as process `incarnation` of `role`.
     ///
     /// # Errors
     /// It is no run of this version, or its shared memory cannot be used.
-    pub(crate) fn take(directory: &Path, role: Role) -> Result<Self, RoleError> {
+    pub(crate) fn take(directory: &Path, role: Role, incarnation: u32) -> Result<Self, RoleError> {
         let stop = Arc::new(AtomicBool::new(false));
         for signal in [SIGTERM, SIGINT] {
             signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(RoleError::Signals)?;
@@ -122,6 +126,7 @@ impl Seat {
         let delay = run.options.delays.iter().find(|delay| delay.role == role);
         Ok(Self {
             role,
+            incarnation,
             node: ports::join(&run.root, &run.prefix, &role.to_string())?,
             topics: Topics::of(
                 run.counts(),
@@ -206,6 +211,11 @@ impl Seat {
         self.notes.push(text);
     }
 
+    /// Where the world keeps its journal.
+    pub(crate) fn journal_path(&self) -> PathBuf {
+        self.directory.join(JOURNAL_FILE)
+    }
+
     /// Where the recorder writes: the place asked for, or one in the run's directory.
     pub(crate) fn trace_path(&self) -> PathBuf {
         let asked = self.options().trace.clone();
@@ -272,6 +282,7 @@ impl Seat {
         let report = RoleReport {
             role: self.role,
             pid: std::process::id(),
+            incarnation: self.incarnation,
             ticks_answered: self.answered,
             cpu_s: clock::cpu_s(),
             wall_s: (last_ns - first_ns) as f64 * 1e-9,

@@ -13,28 +13,32 @@ use shm_types::{
     Checked, ConstraintTable, Counters, HardAnswer, HardRequest, PlannerReport, Schedule,
     WorldSnapshot,
 };
-use world::FIRST_INCARNATION;
 
 use crate::calls::{OPEN_CALLS, Question, Server};
 use crate::clock;
 use crate::histograms::Timed;
 use crate::options::Role;
 use crate::ports::{Access, Publisher};
-use crate::roles::follower::Follower;
+use crate::roles::follower::{Follower, Next};
 use crate::roles::{RoleError, Seat, Telling, refused};
 use crate::wakes::Waker;
 
-/// Takes part in the run in `run_dir` until it ends.
+/// Takes part in the run in `run_dir`, as process `incarnation` of the planner, until it ends.
 ///
 /// # Errors
 /// Set-up failed, or the run broke off.
-pub fn main(run_dir: &Path) -> Result<(), RoleError> {
-    let mut seat = Seat::take(run_dir, Role::Planner)?;
+pub fn main(run_dir: &Path, incarnation: u32) -> Result<(), RoleError> {
+    let mut seat = Seat::take(run_dir, Role::Planner, incarnation)?;
     let robots = seat.run.robots;
     let mut shell = Shell::new(&seat)?;
     let mut follower = Follower::new(&seat, robots, robots + 1)?;
     seat.settle();
-    while let Some(snapshot) = follower.next(&mut seat)? {
+    while let Some(next) = follower.next(&mut seat)? {
+        let Next::Snapshot(snapshot) = next else {
+            shell.connect()?;
+            shell.send()?;
+            continue;
+        };
         seat.follow(&snapshot.header)?;
         let snapshot = Checked::new(&*snapshot, seat.counts()).map_err(refused("world"))?;
         shell.answer(&mut seat, snapshot)?;
@@ -68,6 +72,8 @@ struct Shell {
     outlet: Publisher<PlannerReport>,
     waker: Option<Waker>,
     counters: Counters,
+    /// As it was sent last.
+    report: PlannerReport,
 }
 
 impl Shell {
@@ -76,7 +82,11 @@ impl Shell {
         let schedules = topics.schedule_service(node, Access::Open)?;
         let most = seat.run.robots as usize * (OPEN_CALLS + 1);
         Ok(Self {
-            planner: Planner::new(&seat.scene, seat.options().settings.clone()),
+            planner: Planner::succeeding(
+                &seat.scene,
+                seat.options().settings.clone(),
+                seat.incarnation,
+            ),
             server: topics.hard.service(node, Access::Open)?.server()?,
             questions: Vec::with_capacity(most),
             requests: Vec::with_capacity(most),
@@ -88,6 +98,7 @@ impl Shell {
             outlet: topics.planner.service(node, Access::Open)?.publisher()?,
             waker: seat.waker(|| topics.wake_world.service(node, Access::Open)?.waker())?,
             counters: Counters::default(),
+            report: PlannerReport::default(),
         })
     }
 
@@ -108,15 +119,12 @@ impl Shell {
         let output = self.planner.step(&seat.scene, input, units);
         seat.record_since(Timed::PlannerStep, started_ns);
         seat.answering();
-        self.tables.connect()?;
+        connect(&self.tables, self.schedules.as_ref())?;
         if let Some(table) = output.table {
             self.tables.send(|out| out.copy_from(table))?;
         }
-        if let Some(schedules) = &self.schedules {
-            schedules.connect()?;
-            if let Some(schedule) = output.schedule {
-                schedules.send(|out| out.copy_from(schedule))?;
-            }
+        if let (Some(schedules), Some(schedule)) = (&self.schedules, output.schedule) {
+            schedules.send(|out| out.copy_from(schedule))?;
         }
         for answer in output.answers {
             let asks = |held: &Held| held.seen && is_answer(&held.question, answer);
@@ -126,10 +134,21 @@ impl Shell {
             self.questions.retain(|held| !asks(held));
         }
         self.counters = output.report.counters;
-        let report = PlannerReport {
-            incarnation: FIRST_INCARNATION,
+        self.report = PlannerReport {
+            incarnation: seat.incarnation,
             ..output.report
         };
+        self.send()
+    }
+
+    /// Lets readers in that have come since.
+    fn connect(&self) -> Result<(), RoleError> {
+        connect(&self.tables, self.schedules.as_ref())
+    }
+
+    /// Sends the report as it stands.
+    fn send(&self) -> Result<(), RoleError> {
+        let report = self.report;
         self.outlet.send(|out| *out = report)?;
         if let Some(waker) = &self.waker {
             waker.wake()?;
@@ -170,6 +189,18 @@ impl Shell {
             self.questions.remove(oldest);
         }
     }
+}
+
+/// Lets readers of tables and schedules in that have come since the last was published.
+fn connect(
+    tables: &Publisher<ConstraintTable>,
+    schedules: Option<&Publisher<Schedule>>,
+) -> Result<(), RoleError> {
+    tables.connect()?;
+    if let Some(schedules) = schedules {
+        schedules.connect()?;
+    }
+    Ok(())
 }
 
 fn is_answer(question: &HardRequest, answer: &HardAnswer) -> bool {

@@ -9,15 +9,14 @@
 //! again at once; the world waits for it when it is a whole window behind.
 
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufReader, BufWriter};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use shm_types::{
     Checked, EventKind, MotionBatch, Outcome, RecorderReport, SnapshotHeader, WorldSnapshot,
 };
-use trace::{Ending, SceneRecord, WriteError, Writer};
-use world::FIRST_INCARNATION;
+use trace::{Ending, Resumed, SceneRecord, WriteError, Writer};
 
 use crate::clock;
 use crate::options::Role;
@@ -33,14 +32,17 @@ const PERIOD: Duration = Duration::from_micros(500);
 const BEHIND: u64 = MOTION_WINDOW / 2;
 /// Wall time after which a chunk ends, so that a file cut short has all but the last of it, ns.
 const FLUSH_EVERY_NS: u64 = 1_000_000_000;
+/// Batches, and bytes of them, after which it ends too: until then the world keeps them.
+const FLUSH_EVERY_BATCHES: u64 = 1_024;
+const FLUSH_EVERY_BYTES: usize = 1 << 20;
 
-/// Takes part in the run in `run_dir` until it ends.
+/// Takes part in the run in `run_dir`, as process `incarnation` of the recorder, until it ends.
 ///
 /// # Errors
 /// Set-up failed, the trace cannot be written, or the run broke off.
-pub fn main(run_dir: &Path) -> Result<(), RoleError> {
-    let mut seat = Seat::take(run_dir, Role::Recorder)?;
-    let mut shell = Shell::new(&seat)?;
+pub fn main(run_dir: &Path, incarnation: u32) -> Result<(), RoleError> {
+    let mut seat = Seat::take(run_dir, Role::Recorder, incarnation)?;
+    let mut shell = Shell::new(&mut seat)?;
     seat.settle();
     shell.tell()?;
     while !shell.has_seen_the_end() && !seat.is_stopped() {
@@ -68,6 +70,8 @@ struct Shell {
     waker: Option<Waker>,
     report: RecorderReport,
     batches: u64,
+    /// Bytes of the batches since the last chunk ended.
+    unflushed_bytes: usize,
     /// How the run ended, and when, ns of virtual time.
     ended: Option<(Outcome, u64)>,
     /// Whether the snapshot after that has come, so that everybody can know of the end.
@@ -75,8 +79,7 @@ struct Shell {
 }
 
 impl Shell {
-    fn new(seat: &Seat) -> Result<Self, RoleError> {
-        let (topics, node) = (&seat.topics, &seat.node);
+    fn new(seat: &mut Seat) -> Result<Self, RoleError> {
         let options = seat.options();
         let path = seat.trace_path();
         let every_ns = if options.state_rate_hz > 0.0 {
@@ -85,13 +88,22 @@ impl Shell {
             u64::MAX
         };
         let scene = SceneRecord::new(&seat.scene, &options.settings, seat.run.id_number());
-        let file = File::create(&path).map_err(|error| RoleError::File {
-            path: path.clone(),
-            reason: error.to_string(),
-        })?;
-        let writer = Writer::new(BufWriter::new(file), &scene, every_ns);
+        let (writer, resumed) = open(&path, &scene, every_ns, seat.incarnation)?;
+        if let Some(Resumed {
+            scene_version,
+            scenario_hash,
+            ..
+        }) = &resumed
+        {
+            seat.follow(&SnapshotHeader {
+                scene_version: *scene_version,
+                scenario_hash: u64::from_str_radix(scenario_hash, 16).unwrap_or(seat.scene.hash),
+                ..SnapshotHeader::default()
+            })?;
+        }
+        let next_sequence = resumed.map_or(0, |resumed| resumed.next_sequence);
+        let (topics, node) = (&seat.topics, &seat.node);
         Ok(Self {
-            writer: writer.map_err(|error| unwritten(&path, &error))?,
             path,
             flushed_ns: clock::now_ns(),
             motion: topics.motion.service(node, Access::Open)?.subscriber()?,
@@ -99,10 +111,15 @@ impl Shell {
             outlet: topics.recorder.service(node, Access::Open)?.publisher()?,
             waker: seat.waker(|| topics.wake_world.service(node, Access::Open)?.waker())?,
             report: RecorderReport {
-                incarnation: FIRST_INCARNATION,
-                ..RecorderReport::default()
+                next_sequence,
+                durable_sequence: next_sequence,
+                lost: writer.missing_batches(),
+                incarnation: seat.incarnation,
+                reserved: 0,
             },
-            batches: 0,
+            writer,
+            batches: next_sequence,
+            unflushed_bytes: 0,
             ended: None,
             end_is_out: false,
         })
@@ -118,6 +135,9 @@ impl Shell {
         let snapshot = self.snapshots.receive()?;
         let before = self.batches;
         while let Some(batch) = self.motion.receive()? {
+            if !self.is_next(&batch) {
+                continue;
+            }
             self.follow_batch(seat, &batch)?;
             self.write(&batch)?;
             seat.answering();
@@ -128,13 +148,24 @@ impl Shell {
             // Told already, unless the batch that did was lost.
             self.follow(seat, &snapshot.header)?;
             let snapshot = Checked::new(&*snapshot, seat.counts()).map_err(refused("world"))?;
-            self.end_is_out = snapshot.header.outcome != Outcome::Running.code();
+            let header = &snapshot.header;
+            self.end_is_out = header.outcome != Outcome::Running.code();
+            // A recorder before this one may have had the batch that tells of it.
+            if self.end_is_out && self.report.next_sequence >= header.tick && self.ended.is_none() {
+                let outcome = Outcome::decode(header.outcome).unwrap_or(Outcome::Failed);
+                self.ended = Some((outcome, header.time_ns));
+            }
             self.writer
                 .snapshot(snapshot)
                 .map_err(|error| unwritten(&self.path, &error))?;
         }
-        if clock::now_ns() >= self.flushed_ns + FLUSH_EVERY_NS {
+        let open = self.report.next_sequence - self.report.durable_sequence;
+        if clock::now_ns() >= self.flushed_ns + FLUSH_EVERY_NS
+            || open >= FLUSH_EVERY_BATCHES
+            || self.unflushed_bytes >= FLUSH_EVERY_BYTES
+        {
             self.flush()?;
+            self.tell()?;
         }
         let taken = self.batches - before;
         if taken > 0 {
@@ -143,6 +174,13 @@ impl Shell {
             self.outlet.connect()?;
         }
         Ok(taken)
+    }
+
+    /// Whether a batch is the one expected, or a later one while those before it are lost: what
+    /// the world still has comes again.
+    fn is_next(&self, batch: &MotionBatch) -> bool {
+        let next = self.report.next_sequence;
+        batch.sequence == next || (batch.sequence > next && batch.kept_from > next)
     }
 
     /// Begins a version of the scene with the batch that tells of it.
@@ -179,6 +217,7 @@ impl Shell {
             .batch(batch)
             .map_err(|error| unwritten(&self.path, &error))?;
         self.batches += 1;
+        self.unflushed_bytes += size_of_val(batch.motions()) + size_of_val(batch.events());
         self.report.next_sequence = batch.sequence + 1;
         self.report.lost = self.writer.missing_batches();
         let ended = EventKind::Ended.code();
@@ -194,7 +233,10 @@ impl Shell {
         self.flushed_ns = clock::now_ns();
         self.writer
             .flush()
-            .map_err(|error| unwritten(&self.path, &error))
+            .map_err(|error| unwritten(&self.path, &error))?;
+        self.unflushed_bytes = 0;
+        self.report.durable_sequence = self.report.next_sequence;
+        Ok(())
     }
 
     /// Tells the world how far it has come.
@@ -237,6 +279,37 @@ impl Shell {
         })?;
         Ok(summary)
     }
+}
+
+/// A new trace; or, by a process that was started again, the one of its predecessor, as far as
+/// that is whole.
+fn open(
+    path: &Path,
+    scene: &SceneRecord,
+    every_ns: u64,
+    incarnation: u32,
+) -> Result<(Writer<BufWriter<File>>, Option<Resumed>), RoleError> {
+    let failed = |error: std::io::Error| RoleError::File {
+        path: path.to_owned(),
+        reason: error.to_string(),
+    };
+    if incarnation > 1
+        && let Ok(old) = File::open(path)
+    {
+        // Beside the old one, which stays until all that it has is in the new one.
+        let draft = path.with_extension("mcap.part");
+        let out = BufWriter::new(File::create(&draft).map_err(failed)?);
+        let made = Writer::go_on(BufReader::new(old), out, scene, every_ns)
+            .map_err(|error| unwritten(path, &error))?;
+        if let Some((writer, resumed)) = made {
+            std::fs::rename(&draft, path).map_err(failed)?;
+            return Ok((writer, Some(resumed)));
+        }
+        std::fs::remove_file(&draft).map_err(failed)?;
+    }
+    let file = File::create(path).map_err(failed)?;
+    let writer = Writer::new(BufWriter::new(file), scene, every_ns);
+    Ok((writer.map_err(|error| unwritten(path, &error))?, None))
 }
 
 fn unwritten(path: &Path, error: &WriteError) -> RoleError {

@@ -12,27 +12,25 @@ mod timing;
 
 use std::path::Path;
 
-use robot::{Robot, RobotInput};
-use shm_types::{Checked, Command, ConstraintTable, Schedule, SnapshotHeader, WorldSnapshot};
-use world::FIRST_INCARNATION;
-
 use crate::clock;
 use crate::histograms::Timed;
 use crate::options::Role;
 use crate::ports::{Access, Publisher};
-use crate::roles::follower::Follower;
+use crate::roles::follower::{Follower, Next};
 use crate::roles::tables::Tables;
 use crate::roles::{RoleError, Seat, Telling, refused};
 use crate::wakes::Waker;
 use questions::Questions;
+use robot::{Robot, RobotInput};
+use shm_types::{Checked, Command, ConstraintTable, Schedule, SnapshotHeader, WorldSnapshot};
 use timing::Timing;
 
-/// Takes part in the run in `run_dir` as robot `index` until it ends.
+/// Takes part in the run in `run_dir` as process `incarnation` of robot `index` until it ends.
 ///
 /// # Errors
 /// Set-up failed, or the run broke off.
-pub fn main(run_dir: &Path, index: u32) -> Result<(), RoleError> {
-    let mut seat = Seat::take(run_dir, Role::Robot(index))?;
+pub fn main(run_dir: &Path, index: u32, incarnation: u32) -> Result<(), RoleError> {
+    let mut seat = Seat::take(run_dir, Role::Robot(index), incarnation)?;
     let robots = seat.run.robots;
     if index >= robots {
         return Err(RoleError::Index { index, robots });
@@ -40,7 +38,11 @@ pub fn main(run_dir: &Path, index: u32) -> Result<(), RoleError> {
     let mut shell = Shell::new(&seat, index)?;
     let mut follower = Follower::new(&seat, index, robots + 1)?;
     seat.settle();
-    while let Some(snapshot) = follower.next(&mut seat)? {
+    while let Some(next) = follower.next(&mut seat)? {
+        let Next::Snapshot(snapshot) = next else {
+            shell.send()?;
+            continue;
+        };
         let received_ns = clock::now_ns();
         shell.follow(&mut seat, &snapshot.header)?;
         let snapshot = Checked::new(&*snapshot, seat.counts()).map_err(refused("world"))?;
@@ -80,7 +82,7 @@ impl Shell {
         let schedules = schedules.map(|service| Tables::new(&service, seat.counts()));
         Ok(Self {
             index,
-            robot: Robot::new(&seat.scene, settings, index, FIRST_INCARNATION),
+            robot: Robot::new(&seat.scene, settings, index, seat.incarnation),
             tables: Tables::new(
                 &topics.constraints.service(node, Access::Open)?,
                 seat.counts(),
@@ -146,8 +148,14 @@ impl Shell {
         if let Some(question) = asked {
             self.questions.ask(question)?;
         }
-        self.outlet.send(|out| *out = *self.command)?;
+        self.send()?;
         self.timing.sent(&self.command);
+        Ok(())
+    }
+
+    /// Sends the command as it stands.
+    fn send(&self) -> Result<(), RoleError> {
+        self.outlet.send(|out| *out = *self.command)?;
         if let Some(waker) = &self.waker {
             waker.wake()?;
         }

@@ -5,22 +5,25 @@
 //! seen the end.
 //! Not responsible for: anything the world decides (crate `world`).
 //!
-//! Both snapshots and batches of motion are written in place. A batch is sent before the snapshot
-//! it led to.
+//! Snapshots are written in place. Each tick is in the journal before anything of it is sent, so a
+//! world process that is started again goes on from where the one before it stopped: it sends the
+//! newest snapshot once more, as another *generation*, and everybody answers it as before.
 
 mod changes;
 mod ears;
 mod hashes;
+mod outbox;
 
 use std::path::Path;
 use std::time::Duration;
 
 use shm_types::capacity::MAX_ROBOTS;
-use shm_types::{Activity, ControlRequest, MotionBatch, Outcome, WorldSnapshot};
+use shm_types::{Activity, ControlRequest, MotionBatch, Outcome, SnapshotHeader, WorldSnapshot};
 use world::{World, WorldInput};
 
 use crate::clock;
 use crate::histograms::Timed;
+use crate::journal::{Found, Journal};
 use crate::options::Role;
 use crate::ports::{Access, Publisher};
 use crate::report::{ActivityReport, WorldReport};
@@ -31,6 +34,7 @@ use crate::wakes::Waker;
 use changes::Changes;
 use ears::Ears;
 use hashes::HashFile;
+use outbox::Outbox;
 
 /// Identity of the run, as the machine knows it: none, so that its state is the same in every run
 /// of a scenario, whatever drives it. The snapshot's own is stamped on it with the time.
@@ -38,16 +42,17 @@ const NO_RUN: u64 = 0;
 /// How long the world sleeps between two looks once the run is over.
 const LINGER: Duration = Duration::from_millis(1);
 
-/// Takes part in the run in `run_dir` until it ends and the supervisor lets go.
+/// Takes part in the run in `run_dir`, as process `incarnation` of the world, until it ends and the
+/// supervisor lets go.
 ///
 /// # Errors
 /// Set-up failed, or the run broke off.
-pub fn main(run_dir: &Path) -> Result<(), RoleError> {
-    let mut seat = Seat::take(run_dir, Role::World)?;
-    let mut shell = Shell::new(&seat)?;
+pub fn main(run_dir: &Path, incarnation: u32) -> Result<(), RoleError> {
+    let mut seat = Seat::take(run_dir, Role::World, incarnation)?;
+    let mut shell = Shell::new(&mut seat)?;
     seat.settle();
     shell.publish(&mut seat)?;
-    if shell.wait_for_all(&seat)? {
+    if shell.world.outcome() == Outcome::Running && shell.wait_for_all(&seat)? {
         shell.start_ticker(&seat);
         shell.run(&mut seat)?;
     }
@@ -61,6 +66,54 @@ pub fn main(run_dir: &Path) -> Result<(), RoleError> {
     seat.leave(telling)
 }
 
+/// Opens the journal; the states that a world process before this one has left, newest first.
+fn open_journal(seat: &Seat) -> Result<(Journal, Vec<Found>), RoleError> {
+    let path = seat.journal_path();
+    let room = outbox::room_for(seat.scene.counts(), &seat.options().settings);
+    Journal::open(&path, seat.run.id_number(), room).map_err(|error| RoleError::File {
+        path,
+        reason: error.to_string(),
+    })
+}
+
+/// The world as it was in the newest state that is whole.
+fn restore(seat: &mut Seat, found: &[Found]) -> Result<Option<World>, RoleError> {
+    let settings = seat.options().settings.clone();
+    let mut why = None;
+    for (_, bytes) in found {
+        let Some(scenario_hash) = World::scene_of(bytes) else {
+            continue;
+        };
+        if scenario_hash != seat.scene.hash {
+            // Some version after the first; which one is known once the state is read.
+            seat.follow(&SnapshotHeader {
+                scene_version: u32::MAX,
+                scenario_hash,
+                ..SnapshotHeader::default()
+            })?;
+        }
+        match World::restore(&seat.scene, settings.clone(), bytes) {
+            Ok(world) => {
+                seat.follow(&SnapshotHeader {
+                    scene_version: world.scene_version(),
+                    scenario_hash,
+                    ..SnapshotHeader::default()
+                })?;
+                return Ok(Some(world));
+            }
+            Err(error) => why = Some(error),
+        }
+    }
+    match why {
+        None => Ok(None),
+        // Beginning anew would undo what everybody has seen.
+        Some(error) => Err(RoleError::File {
+            path: seat.journal_path(),
+            reason: format!("no state in it is whole: {error}"),
+        }),
+    }
+}
+
 /// The world and its ports.
 struct Shell {
     world: World,
@@ -69,7 +122,9 @@ struct Shell {
     ears: Ears,
     changes: Changes,
     snapshots: Publisher<WorldSnapshot>,
-    motion: Publisher<MotionBatch>,
+    /// What the step makes.
+    batch: Box<MotionBatch>,
+    outbox: Outbox,
     waiter: Waiter,
     waker: Option<Waker>,
     /// The own deadlines, in real time.
@@ -83,22 +138,32 @@ struct Shell {
 }
 
 impl Shell {
-    fn new(seat: &Seat) -> Result<Self, RoleError> {
+    fn new(seat: &mut Seat) -> Result<Self, RoleError> {
+        let (journal, found) = open_journal(seat)?;
+        let world = match restore(seat, &found)? {
+            Some(world) => world,
+            None => World::new(&seat.scene, seat.options().settings.clone(), NO_RUN),
+        };
         let (topics, node) = (&seat.topics, &seat.node);
         let options = seat.options();
+        let tick = world.tick();
+        let mut changes = Changes::new(&options.changes);
+        changes.go_on_from(tick);
+        let motion = topics.motion.service(node, Access::Open)?.publisher()?;
         let sleeper = || topics.wake_world.service(node, Access::Open)?.sleeper();
         let waker = || {
             let wakes = &topics.wake_participants;
             wakes.service(node, Access::Open)?.waker()
         };
         Ok(Self {
-            world: World::new(&seat.scene, options.settings.clone(), NO_RUN),
             run_id: seat.run.id_number(),
-            tick: 0,
-            ears: Ears::new(seat)?,
-            changes: Changes::new(&options.changes),
+            tick,
+            ears: Ears::new(seat, &world)?,
+            outbox: Outbox::new(journal, motion, &world)?,
+            batch: shm_types::zeroed(),
+            world,
+            changes,
             snapshots: topics.world.service(node, Access::Open)?.publisher()?,
-            motion: topics.motion.service(node, Access::Open)?.publisher()?,
             waiter: seat.waiter(sleeper)?,
             waker: seat.waker(waker)?,
             ticker: None,
@@ -106,7 +171,7 @@ impl Shell {
             hashes: options
                 .hashes
                 .as_deref()
-                .map(HashFile::create)
+                .map(|path| HashFile::create(path, tick))
                 .transpose()?,
             control: Vec::with_capacity(ears::MOST_REQUESTS),
             published_ns: 0,
@@ -154,7 +219,7 @@ impl Shell {
     fn wait_for_all(&mut self, seat: &Seat) -> Result<bool, RoleError> {
         loop {
             self.listen(seat)?;
-            if self.ears.have_answered(self.tick) || self.ears.stop_is_asked() {
+            if self.is_answered() || self.ears.stop_is_asked() {
                 self.waiter.arrived();
                 return Ok(true);
             }
@@ -166,8 +231,14 @@ impl Shell {
         }
     }
 
+    /// Whether everybody has answered the present tick, and what it leads to can be kept.
+    fn is_answered(&self) -> bool {
+        self.ears.have_answered(self.tick) && self.outbox.has_room()
+    }
+
     fn listen(&mut self, seat: &Seat) -> Result<(), RoleError> {
-        self.ears.listen(seat, &self.world, &mut self.changes)
+        self.ears.listen(seat, &self.world, &mut self.changes)?;
+        self.outbox.send(self.tick, self.ears.recorded())
     }
 
     /// Does what the run was given for the present tick.
@@ -183,11 +254,10 @@ impl Shell {
 
     fn connect(&self) -> Result<(), RoleError> {
         self.snapshots.connect()?;
-        self.motion.connect()?;
-        Ok(())
+        self.outbox.connect()
     }
 
-    /// One tick of the machine; its motion is on its way when this returns.
+    /// One tick of the machine; it is safe, and its motion on its way, when this returns.
     fn step(&mut self, seat: &mut Seat) -> Result<(), RoleError> {
         let started_ns = clock::now_ns();
         self.ears.take_control(&mut self.control);
@@ -202,9 +272,7 @@ impl Shell {
             control: &self.control,
             change: change.as_ref(),
         };
-        let world = &mut self.world;
-        self.motion
-            .send(|batch| world.step(&seat.scene, input, batch))?;
+        self.world.step(&seat.scene, input, &mut self.batch);
         self.tick += 1;
         if let Some(next) = change {
             seat.scene = next.scene;
@@ -214,22 +282,28 @@ impl Shell {
         if let Some(hashes) = &mut self.hashes {
             hashes.add(self.world.state_hash())?;
         }
-        Ok(())
+        let kept_ns = clock::now_ns();
+        self.outbox.keep(&self.batch, &self.world)?;
+        seat.record_since(Timed::Journal, kept_ns);
+        self.ears.reply()?;
+        self.outbox.send(self.tick, self.ears.recorded())
     }
 
     fn publish(&mut self, seat: &mut Seat) -> Result<(), RoleError> {
         let (world, run_id) = (&self.world, self.run_id);
+        let generation = self.outbox.generation();
         let started_ns = clock::now_ns();
         let mut stamp_ns = started_ns;
         self.snapshots.send(|snapshot| {
             world.snapshot_into(snapshot);
             snapshot.header.run_id = run_id;
+            snapshot.header.generation = generation;
             stamp_ns = clock::now_ns();
             snapshot.header.publish_stamp_ns = stamp_ns;
         })?;
         let sent_ns = clock::now_ns();
         let before_ns = std::mem::replace(&mut self.published_ns, sent_ns);
-        if self.tick > 1 {
+        if self.tick > 1 && before_ns > 0 {
             let latencies = &mut seat.latencies;
             latencies.record(Timed::SnapshotWrite, stamp_ns - started_ns);
             latencies.record(Timed::SnapshotSend, sent_ns - stamp_ns);
@@ -249,9 +323,6 @@ impl Shell {
 
     /// Stays, so that everybody can see the end, until the supervisor lets go.
     fn linger(&mut self, seat: &Seat) -> Result<(), RoleError> {
-        if let Some(hashes) = &mut self.hashes {
-            hashes.flush()?;
-        }
         while !seat.is_stopped() {
             self.listen(seat)?;
             self.connect()?;

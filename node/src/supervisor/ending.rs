@@ -10,10 +10,12 @@ use std::time::{Duration, Instant};
 
 use shm_types::Outcome;
 
+use crate::children::Participant;
 use crate::histograms::Latencies;
 use crate::options::Role;
 use crate::report::{RoleReport, RunReport, WorkReport, WorldReport};
 use crate::roles::TRACE_FILE;
+use crate::supervisor::member::{Member, State};
 use crate::supervisor::{End, PERIOD, Run, names};
 
 /// How long participants may take to leave by themselves. The recorder has a file to finish.
@@ -45,6 +47,9 @@ impl Run<'_> {
             }
         }
         let mut notes = std::mem::take(&mut self.notes);
+        if self.cleared > 0 {
+            notes.push(format!("{} half-made files removed", self.cleared));
+        }
         notes.extend(joined_notes(&roles));
         let makers = roles.iter().find(|role| role.role == Role::World);
         let (lost_commands, wall_s) = makers.map_or((0, 0.0), |world| (world.lost, world.wall_s));
@@ -70,14 +75,27 @@ impl Run<'_> {
         }
     }
 
-    /// Everybody but the world leaves by itself once it has seen the end.
+    /// Everybody but the world leaves by itself once it has seen the end. A recorder that dies
+    /// before the trace is whole is started again; nobody else is missed.
     fn await_others(&mut self) {
         let by = Instant::now() + LEAVE_GRACE;
         while Instant::now() < by {
+            let _ = self.watch.look();
+            let is_failed = |one: &mut Member| {
+                let vital = matches!(one.role, Role::World | Role::Recorder);
+                let process = one.process.as_mut().filter(|_| vital);
+                process.is_some_and(|one| one.ended().is_some_and(|status| !status.success()))
+                    || (vital && matches!(one.state, State::Down { .. }))
+            };
+            if self.members.iter_mut().any(is_failed) && !matches!(self.recover_at_end(), Ok(true))
+            {
+                return;
+            }
             let mut others = self
-                .participants
+                .members
                 .iter_mut()
-                .filter(|one| one.role != Role::World);
+                .filter(|one| one.role != Role::World && one.state != State::Gone)
+                .filter_map(|one| one.process.as_mut());
             if others.all(|one| one.ended().is_some()) {
                 return;
             }
@@ -91,25 +109,23 @@ impl Run<'_> {
 
     /// Asks those that are left to leave, then kills them.
     fn end_all(&mut self) {
-        for one in &mut self.participants {
+        let mut processes: Vec<&mut Participant> = (self.members.iter_mut())
+            .filter_map(|one| one.process.as_mut())
+            .collect();
+        for one in &mut processes {
             one.terminate();
         }
         let by = Instant::now() + TERMINATE_GRACE;
-        while Instant::now() < by
-            && !self
-                .participants
-                .iter_mut()
-                .all(|one| one.ended().is_some())
-        {
+        while Instant::now() < by && !processes.iter_mut().all(|one| one.ended().is_some()) {
             std::thread::sleep(PERIOD);
         }
-        for one in &mut self.participants {
+        for one in processes {
             let killed = one.ended().is_none();
             one.kill();
             if killed {
                 self.notes
                     .push(format!("{} did not leave and was killed", one.role));
-            } else if one.ended().is_some_and(|status| !status.success()) {
+            } else if one.has_failed_by_itself() {
                 self.notes.push(one.last_words());
             }
         }

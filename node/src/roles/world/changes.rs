@@ -32,6 +32,11 @@ impl Changes {
         }
     }
 
+    /// A world that goes on from `tick` has done all that was given for those before.
+    pub(super) fn go_on_from(&mut self, tick: u64) {
+        self.timed.retain(|timed| timed.tick >= tick);
+    }
+
     /// What the run was given for this tick, one after the other.
     pub(super) fn due(&mut self, tick: u64) -> Option<ToldAt> {
         self.timed.pop_front_if(|timed| timed.tick <= tick)

@@ -13,10 +13,10 @@ use shm_types::{
     Checked, Command, ConstraintTable, ControlKind, ControlReply, ControlRequest, Counts,
     PlannerReport, RecorderReport, RoleKind, Schedule, Validate,
 };
-use world::{FIRST_INCARNATION, PublishedSchedule, World};
+use world::{PublishedSchedule, World};
 
 use super::changes::{Changes, changes_of, take_part};
-use crate::calls::Server;
+use crate::calls::{Question, Server};
 use crate::options::Told;
 use crate::ports::{Access, Subscriber};
 use crate::roles::tables::Tables;
@@ -30,9 +30,13 @@ pub(super) const MOST_REQUESTS: usize = 16;
 #[derive(Clone, Default)]
 struct Robot {
     incarnation: u32,
-    /// Whether a command has come at all.
+    /// Whether a command of that process has come at all.
     heard: bool,
+    /// There is no process: nobody waits for its answer.
+    gone: bool,
     command: Command,
+    /// The newest command of a process that nobody has told of yet. It is not repeated.
+    early: Option<Command>,
 }
 
 /// The world's receiving ports, and the newest of all that came.
@@ -48,19 +52,22 @@ pub(super) struct Ears {
     report: Option<PlannerReport>,
     recorded: Option<RecorderReport>,
     requests: Vec<ControlRequest>,
+    /// What is answered once the tick that takes it is safe.
+    replies: Vec<(Question<ControlRequest, ControlReply>, ControlReply)>,
     lost_commands: u64,
 }
 
 impl Ears {
-    pub(super) fn new(seat: &Seat) -> Result<Self, RoleError> {
+    /// Those of a world that has just come to be, from the beginning or from its journal.
+    pub(super) fn new(seat: &Seat, world: &World) -> Result<Self, RoleError> {
         let (topics, node) = (&seat.topics, &seat.node);
         let schedules = topics.schedule_service(node, Access::Open)?;
         let schedules = schedules.map(|service| Tables::new(&service, seat.counts()));
         let constraints = topics.constraints.service(node, Access::Open)?;
-        let robot = Robot {
-            incarnation: FIRST_INCARNATION,
+        let robots = (0..seat.run.robots as usize).map(|robot| Robot {
+            incarnation: world.incarnation(robot),
             ..Robot::default()
-        };
+        });
         Ok(Self {
             counts: seat.counts(),
             commands: topics.command.service(node, Access::Open)?.subscriber()?,
@@ -69,10 +76,11 @@ impl Ears {
             control: topics.control.service(node, Access::Open)?.server()?,
             tables: Tables::new(&constraints, seat.counts())?,
             schedules: schedules.transpose()?,
-            robots: vec![robot; seat.run.robots as usize],
+            robots: robots.collect(),
             report: None,
             recorded: None,
             requests: Vec::with_capacity(MOST_REQUESTS),
+            replies: Vec::with_capacity(MOST_REQUESTS),
             lost_commands: 0,
         })
     }
@@ -104,7 +112,23 @@ impl Ears {
         {
             let result = self.obey(seat, &request, world, changes);
             let words = result.as_ref().map(|tick| *tick).map_err(String::as_str);
-            request.answer(ControlReply::new(request.id, words))?;
+            let reply = ControlReply::new(request.id, words);
+            // The supervisor asks again until it sees that it is so; and asks more than can be held.
+            let is_users =
+                self.of_a_process(&request).is_none() && request.kind != ControlKind::Stop.code();
+            if result.is_ok() && is_users && self.replies.len() < MOST_REQUESTS {
+                self.replies.push((request, reply));
+            } else {
+                request.answer(reply)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Answers what the tick just made has taken: it will not be forgotten any more.
+    pub(super) fn reply(&mut self) -> Result<(), RoleError> {
+        for (request, reply) in self.replies.drain(..) {
+            request.answer(reply)?;
         }
         Ok(())
     }
@@ -115,6 +139,10 @@ impl Ears {
             return;
         }
         let robot = &mut self.robots[command.robot as usize];
+        if command.incarnation > robot.incarnation {
+            robot.early = Some(*command);
+            return;
+        }
         let newer = command.sequence > robot.command.sequence;
         if command.incarnation != robot.incarnation || (robot.heard && !newer) {
             return;
@@ -135,6 +163,14 @@ impl Ears {
         world: &World,
         changes: &mut Changes,
     ) -> Result<u64, String> {
+        if let Some(robot) = self.of_a_process(request)
+            && request.incarnation >= robot.incarnation
+        {
+            robot.gone = request.kind == ControlKind::Down.code();
+        }
+        if (self.requests.iter()).any(|waiting| is_same(waiting, request)) {
+            return Ok(world.tick() + 1);
+        }
         let tick = world.reply_to(request).result()?;
         if request.kind == ControlKind::Change.code() {
             let asked = changes_of(request.changes());
@@ -146,16 +182,26 @@ impl Ears {
             .validate(self.counts)
             .map_err(|invalid| invalid.to_string())?;
         self.requests.push(*request);
-        if request.role != RoleKind::Robot.code() {
-            return Ok(tick);
-        }
-        let robot = &mut self.robots[request.index as usize];
-        let is_new = request.incarnation > 0 && request.incarnation != robot.incarnation;
-        if request.kind == ControlKind::Up.code() && is_new {
+        if let Some(robot) = self.of_a_process(request)
+            && request.incarnation > robot.incarnation
+        {
             robot.incarnation = request.incarnation;
-            robot.heard = false;
+            let early = (robot.early.take()).filter(|early| early.incarnation == robot.incarnation);
+            robot.heard = early.is_some();
+            robot.command = early.unwrap_or(robot.command);
         }
         Ok(tick)
+    }
+
+    /// The robot that a request says something of the process of. What users say has no number of
+    /// a process.
+    fn of_a_process(&mut self, request: &ControlRequest) -> Option<&mut Robot> {
+        let kinds = [ControlKind::Up, ControlKind::Down, ControlKind::Standby];
+        let is_one = kinds.iter().any(|kind| kind.code() == request.kind)
+            && request.role == RoleKind::Robot.code()
+            && request.incarnation > 0;
+        let robot = self.robots.get_mut(request.index as usize);
+        robot.filter(|_| is_one)
     }
 
     /// Does what the run was given for this tick.
@@ -192,20 +238,25 @@ impl Ears {
         }
     }
 
-    /// Whether every participant has answered `tick`. A robot that takes part no more has, too: its
-    /// process goes on, so that it may take part again, and is where the others are then. (Where
-    /// a process may be gone, in real time, nobody waits for anybody.)
+    /// Whether every participant has answered `tick`. A robot that takes part no more has, too, as
+    /// long as there is a process of it: so that it may take part again, and is where the others
+    /// are then.
     pub(super) fn have_answered(&self, tick: u64) -> bool {
         let robots = self
             .robots
             .iter()
-            .all(|robot| robot.heard && robot.command.tick >= tick);
+            .all(|robot| robot.gone || (robot.heard && robot.command.tick >= tick));
         let planner = self.report.is_some_and(|report| report.tick >= tick);
         let recorder = self
             .recorded
             .is_some_and(|report| tick < report.next_sequence.saturating_add(MOTION_WINDOW));
         // Nobody has answered the first tick before it has said so.
         robots && planner && recorder
+    }
+
+    /// How far the recorder has come.
+    pub(super) const fn recorded(&self) -> Option<&RecorderReport> {
+        self.recorded.as_ref()
     }
 
     /// Whether somebody has asked for the end.
@@ -260,4 +311,19 @@ impl Ears {
     pub(super) const fn lost_commands(&self) -> u64 {
         self.lost_commands
     }
+}
+
+/// Whether two requests ask for the same of the same process.
+fn is_same(one: &ControlRequest, other: &ControlRequest) -> bool {
+    let of = |request: &ControlRequest| {
+        let ControlRequest {
+            kind,
+            role,
+            index,
+            incarnation,
+            ..
+        } = *request;
+        (kind, role, index, incarnation)
+    };
+    one.incarnation > 0 && of(one) == of(other)
 }

@@ -3,35 +3,44 @@
 //! Responsible for: one line of sixteen hexadecimal digits for each tick from the first on.
 //! Not responsible for: what is hashed (crate `world`).
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::fs::{File, OpenOptions};
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use crate::roles::RoleError;
 
+/// Bytes of a line.
+const LINE: u64 = 17;
+
 /// A file of hashes.
 pub(super) struct HashFile {
     path: PathBuf,
-    file: BufWriter<File>,
+    file: File,
 }
 
 impl HashFile {
-    pub(super) fn create(path: &Path) -> Result<Self, RoleError> {
-        let file = File::create(path).map_err(|error| file_error(path, &error))?;
+    /// Keeps the lines of the first `ticks` ticks, of a world process before this one.
+    pub(super) fn create(path: &Path, ticks: u64) -> Result<Self, RoleError> {
+        let open = || {
+            let mut file = OpenOptions::new()
+                .write(true)
+                .create(true)
+                .truncate(false)
+                .open(path)?;
+            file.set_len(ticks * LINE)?;
+            file.seek(SeekFrom::End(0))?;
+            Ok(file)
+        };
         Ok(Self {
             path: path.to_owned(),
-            file: BufWriter::new(file),
+            file: open().map_err(|error| file_error(path, &error))?,
         })
     }
 
+    /// Adds a line, which is in the file when this returns.
     pub(super) fn add(&mut self, hash: u64) -> Result<(), RoleError> {
-        writeln!(self.file, "{hash:016x}").map_err(|error| file_error(&self.path, &error))
-    }
-
-    pub(super) fn flush(&mut self) -> Result<(), RoleError> {
-        self.file
-            .flush()
-            .map_err(|error| file_error(&self.path, &error))
+        let line = format!("{hash:016x}\n");
+        (self.file.write_all(line.as_bytes())).map_err(|error| file_error(&self.path, &error))
     }
 }
 
