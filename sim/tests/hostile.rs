@@ -1,6 +1,6 @@
 //! Hostile input, a bounded share: a fixed seed and a fresh one for each kind of input.
 //!
-//! More of the same: `fuzz/README.md`.
+//! More of the same: `cargo run --release -p sim --example hostile 10000000`.
 
 #![expect(clippy::expect_used, reason = "a test may fail")]
 

@@ -3,7 +3,7 @@
 //!
 //! Responsible for: one target for each kind of input, which changes a good value as a tape of
 //! bytes says, has it checked, and drives the machines with what was accepted. The ordinary tests
-//! (`sim/tests/hostile.rs`), the loop that counts and libFuzzer (`fuzz/`) all feed these.
+//! (`sim/tests/hostile.rs`) and the loop that counts (`sim/examples/hostile.rs`) feed these.
 //! Not responsible for: where tapes come from.
 //!
 //! A tape is read four bytes at a time: how many changes, then for each a place and what to put
