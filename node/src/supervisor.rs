@@ -16,6 +16,8 @@ mod member;
 mod recovery;
 mod signals;
 mod watch;
+#[cfg(test)]
+mod wedge;
 
 use std::io;
 use std::time::{Duration, Instant};

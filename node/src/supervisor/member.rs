@@ -63,6 +63,8 @@ pub(super) struct Member {
     /// Processes in a row that ended before they had answered a tick, and since when.
     failures: u32,
     failing_since: Option<Instant>,
+    /// Those of them, in a row, that ended of themselves: nobody killed them.
+    own_failures: u32,
     /// When it answered its first tick.
     answered: Instant,
     pub(super) news: Option<News>,
@@ -80,6 +82,7 @@ impl Member {
             incarnation,
             failures: 0,
             failing_since: None,
+            own_failures: 0,
             answered: now,
             news: None,
             idle: (Life::default(), now),
@@ -117,6 +120,7 @@ impl Member {
     pub(super) fn forgive(&mut self) {
         if self.state == State::Ready && self.answered.elapsed() > PROBATION {
             (self.failures, self.failing_since) = (0, None);
+            self.own_failures = 0;
         }
     }
 
@@ -131,6 +135,7 @@ impl Member {
         } else {
             (self.failures, self.failing_since) = (0, None);
         }
+        self.own_failures = if by_itself { self.own_failures + 1 } else { 0 };
         let since = *self.failing_since.get_or_insert(now);
         let enough = match give_up {
             GiveUp::Times(times) => self.failures >= times,
@@ -148,9 +153,9 @@ impl Member {
         !enough
     }
 
-    /// How often in a row it has failed to answer a tick.
-    pub(super) const fn failures(&self) -> u32 {
-        self.failures
+    /// How often in a row it has ended of itself.
+    pub(super) const fn own_failures(&self) -> u32 {
+        self.own_failures
     }
 }
 

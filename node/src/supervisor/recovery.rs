@@ -23,9 +23,9 @@ use crate::supervisor::{ASK_AGAIN, End, PERIOD, Run, RunError, names};
 
 /// How often the set-up of a run is tried.
 const ATTEMPTS: u32 = 3;
-/// Processes that may end by themselves before they have answered, while the run is set up: more
-/// often, it is no accident.
-const MOST_OWN_FAILURES: u32 = 3;
+/// Processes in a row that may end of themselves before they have answered, while the run is set
+/// up: after that it is no accident, such as a port of a dead process that is still in the way.
+const MOST_OWN_FAILURES: u32 = 5;
 /// Notes of processes that were started again.
 const MOST_NOTES: usize = 20;
 /// How long the news of the run's end may take to come to the supervisor.
@@ -83,7 +83,7 @@ impl Run<'_> {
     fn refuse_own_failures(&self) -> Result<(), RunError> {
         for one in &self.members {
             let process = one.process.as_ref();
-            if one.failures() >= MOST_OWN_FAILURES
+            if one.own_failures() >= MOST_OWN_FAILURES
                 && matches!(one.state, State::Down { .. })
                 && let Some(process) = process.filter(|process| process.has_failed_by_itself())
             {
