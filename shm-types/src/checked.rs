@@ -16,6 +16,10 @@ use crate::{
     WorldSnapshot,
 };
 
+/// No run comes to a tick, a time in ns or an epoch past this: what is added to one does not
+/// overflow.
+const MOST_TICKS: u64 = 1 << 60;
+
 /// Why a message was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Invalid {
@@ -224,6 +228,11 @@ impl Validate for WorldSnapshot {
         }
         Outcome::decode(header.outcome)?;
         flag("held", header.held)?;
+        if header.tick > MOST_TICKS || header.time_ns > MOST_TICKS || header.epoch > MOST_TICKS {
+            return Err(Invalid::Inconsistent {
+                what: "a tick, a time or an epoch that no run comes to",
+            });
+        }
         for robot in &self.robots[..header.robot_count as usize] {
             finite("a robot's position", robot.position)?;
             finite("a robot's position at the epoch", robot.epoch_position)?;
