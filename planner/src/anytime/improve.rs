@@ -1,17 +1,21 @@
 //! Making a plan better: which order is tried next.
 //!
-//! Responsible for: orders near the best one, orders from far away that promise most.
+//! Responsible for: orders near the best one, orders from far away that promise most, orders in
+//! which an object is set aside to make way.
 //! Not responsible for: how long an order takes (`plan`), the plan itself (`solver`).
 //!
-//! How: both take turns. Where robots hardly meet, the time that an order takes with the walls alone
-//! tells good ones from bad ones; where they do, only trying does.
+//! How: the three take turns. Where robots hardly meet, the time that an order takes with the walls
+//! alone tells good ones from bad ones; where they do, only trying does.
+
+use std::rc::Rc;
 
 use rand::RngExt;
 use scene::Scene;
 
+use crate::anytime::asides::{ORDERS_LOOKED_AT, vary};
 use crate::anytime::ground::Time;
 use crate::anytime::order::{Hops, Item, change};
-use crate::anytime::solver::Solver;
+use crate::anytime::solver::{Solver, Source};
 
 /// Orders looked at for each one nearby that is tried.
 const LOOKED_AT: usize = 64;
@@ -19,43 +23,42 @@ const LOOKED_AT: usize = 64;
 const DESCENT: usize = 400;
 /// The first of these, which lead there.
 const WANDERING: usize = 30;
+/// Looking at an order, beyond one for each of its moves, in work units.
+const UNITS_PER_ORDER: u64 = 4;
 /// How often in a row nothing may be left to try near the best order until that counts as all.
 const MOST_MISSES: u32 = 30;
 
 impl Solver {
     /// Tries one more order. False if nothing near the best one is left to try.
     pub(crate) fn improve(&mut self, scene: &Scene) -> bool {
-        let Some(hops) = self.hops.take() else {
+        let (Some(best), Some((hops, order))) = (&self.best, self.current.clone()) else {
             return false;
         };
-        let goes_on = self.improve_with(scene, &hops);
-        self.hops = Some(hops);
-        goes_on
-    }
-
-    fn improve_with(&mut self, scene: &Scene, hops: &Hops) -> bool {
-        let Some(best) = self.best.as_ref().map(|best| best.makespan) else {
-            return false;
-        };
+        let best = best.makespan;
         self.turn += 1;
-        let chosen = if self.turn % 2 == 1 {
-            self.descend(hops, best)
-        } else {
-            self.reorder(hops, best)
+        let chosen = match self.turn % 3 {
+            0 => self.set_aside(scene, &hops, &order, best),
+            1 => self.descend(hops, &order, best),
+            _ => self.reorder(hops, &order, best),
         };
-        let Some(near) = chosen else {
+        let Some((hops, near)) = chosen else {
             self.misses += 1;
             self.go_back();
             return self.misses < MOST_MISSES;
         };
         self.misses = 0;
-        self.tried.insert(near.clone());
         // A little worse is good enough to go on from: what is better may lie behind it.
         let limit = best + best / 32;
-        if let Some(makespan) = self.decode(scene, hops, &near, limit) {
-            self.current.clone_from(&near);
+        if let Some(makespan) = self.decode(scene, &hops, &near, limit) {
+            let is_of_other_moves =
+                (self.current.as_ref()).is_none_or(|(current, _)| !Rc::ptr_eq(current, &hops));
+            if is_of_other_moves {
+                self.tried.clear();
+            }
+            self.current = Some((hops, near));
             if makespan < best {
-                self.keep(makespan, near);
+                let source = self.current.clone();
+                self.keep(makespan, source);
             }
         } else if self.random.random_range(0..8) == 0 {
             self.go_back();
@@ -63,11 +66,12 @@ impl Solver {
         true
     }
 
-    /// The order nearby that promises most and was not tried yet.
-    fn reorder(&mut self, hops: &Hops, best: Time) -> Option<Vec<Item>> {
+    /// The order near another one that promises most and was not tried yet.
+    fn reorder(&mut self, hops: Rc<Hops>, order: &[Item], best: Time) -> Option<Source> {
+        self.weigh(&hops, LOOKED_AT);
         let mut chosen: Option<(Time, Vec<Item>)> = None;
         for attempt in 0..LOOKED_AT {
-            let mut near = self.current.clone();
+            let mut near = order.to_vec();
             for _ in 0..=attempt % 4 {
                 change(&mut near, self.homes.len(), &mut self.random);
             }
@@ -79,13 +83,16 @@ impl Solver {
                 chosen = Some((least, near));
             }
         }
-        chosen.map(|(_, near)| near)
+        let (_, near) = chosen?;
+        self.tried.insert(near.clone());
+        Some((hops, near))
     }
 
     /// An order that was not tried yet: from one far away, downhill by the time that orders take
     /// with the walls alone.
-    fn descend(&mut self, hops: &Hops, best: Time) -> Option<Vec<Item>> {
-        let mut found = self.current.clone();
+    fn descend(&mut self, hops: Rc<Hops>, order: &[Item], best: Time) -> Option<Source> {
+        self.weigh(&hops, DESCENT);
+        let mut found = order.to_vec();
         let mut known = hops.least(&found)?;
         for step in 0..DESCENT {
             let mut near = found.clone();
@@ -99,13 +106,73 @@ impl Solver {
                 (found, known) = (near, least);
             }
         }
-        (known < best && !self.tried.contains(&found)).then_some(found)
+        let is_new = known < best && self.tried.insert(found.clone());
+        is_new.then_some((hops, found))
+    }
+
+    /// An order with another intermediate place.
+    fn set_aside(
+        &mut self,
+        scene: &Scene,
+        hops: &Hops,
+        order: &[Item],
+        best: Time,
+    ) -> Option<Source> {
+        self.weigh(hops, ORDERS_LOOKED_AT);
+        let (hops, order) = vary(
+            scene,
+            &mut self.ground,
+            &self.start,
+            &self.homes,
+            (hops, order),
+            &mut self.random,
+        )?;
+        let promises = hops.least(&order)? < best;
+        promises.then(|| (Rc::new(hops), order))
+    }
+
+    /// Pays for looking at so many orders.
+    fn weigh(&mut self, hops: &Hops, orders: usize) {
+        self.weighing += orders as u64 * (hops.list.len() as u64 + UNITS_PER_ORDER);
     }
 
     /// Goes on from the best order.
     fn go_back(&mut self) {
         if let Some(best) = &self.best {
-            self.current.clone_from(&best.order);
+            self.current.clone_from(&best.source);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use scene::GenerateOptions;
+
+    use crate::anytime::solver::testing::planned;
+    use crate::{BoundLimits, Bounds};
+
+    #[test]
+    fn setting_aside_what_nobody_has_to_move_can_beat_moving_each_object_once() {
+        let mut is_beaten = false;
+        for seed in 11..19 {
+            let options = GenerateOptions {
+                seed,
+                area_m2: 41.5,
+                walls: 4,
+                robots: 2,
+                ..GenerateOptions::default()
+            };
+            let (scene, mut solver, _) = planned(&options);
+            let bounds = Bounds::of(&scene, BoundLimits::default()).unwrap();
+            let r_s = bounds.r_s().unwrap();
+            for _ in 0..200 {
+                solver.improve(&scene);
+            }
+            let found = solver.best.as_ref().unwrap().makespan;
+            let found_s = solver.ground.seconds(found);
+            is_beaten |= found_s < r_s;
+            assert!(found_s > bounds.best_s(), "no plan is below the bound");
+        }
+        assert!(is_beaten);
     }
 }

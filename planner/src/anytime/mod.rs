@@ -11,15 +11,18 @@
 //!
 //! Unlike what the paper's methods compute with, this allocates while it plans.
 
+mod asides;
 mod ground;
 mod improve;
 mod joint;
 mod keep;
+mod known;
 mod order;
 mod plan;
 mod publish;
 mod route;
 mod sequence;
+mod shortest;
 mod situation;
 mod solver;
 mod timeline;
@@ -59,6 +62,10 @@ const TICKS_TO_SETTLE: u64 = 20;
 const DOUBT_NS: u64 = 2_000_000_000;
 /// One configuration of the complete search, in work units.
 const UNITS_PER_CONFIGURATION: u64 = 40;
+/// One configuration of the search for a shortest plan, in work units.
+const UNITS_PER_SMALL_CONFIGURATION: u64 = 10;
+/// One piece of a way that is reserved again, in work units.
+const UNITS_PER_PIECE: u64 = 4;
 /// One safe interval expanded, in work units.
 const UNITS_PER_INTERVAL: u64 = 12;
 
@@ -81,6 +88,8 @@ enum Stage {
     Search,
     /// Better ones, until that many units are spent in all.
     Better(u64),
+    /// A shortest one, of a small room in which everything takes as long.
+    Shorten,
     /// Writing it down.
     Write,
     /// Robots follow it; better ones are looked for in rounds, until that many units are spent in
@@ -399,7 +408,13 @@ impl Anytime {
                 Some(Err(_)) => Stage::First(ATTEMPTS_BEFORE_SEARCH),
             },
             Stage::Better(until) if solver.units() < until && solver.improve(scene) => self.stage,
-            Stage::Better(_) => Stage::Write,
+            Stage::Better(_) => Stage::Shorten,
+            Stage::Shorten
+                if solver.units() < units(MOST_BEFORE_MOTION_S) && solver.shorten(scene) =>
+            {
+                Stage::Shorten
+            }
+            Stage::Shorten => Stage::Write,
             Stage::Write => match solver.restore() {
                 None => Stage::Done(Verdict::NotFound),
                 Some(makespan) => {

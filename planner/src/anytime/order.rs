@@ -101,7 +101,7 @@ impl Hops {
         let mut free = Vec::new();
         for (&home, track) in homes.iter().zip(&start.robots) {
             let field = ground.field(scene, alone, home);
-            let (cell, time, _) = track.free;
+            let (cell, time) = track.free;
             free.push((time, if track.is_gone { 0 } else { read(&field, cell) }));
             for (hop, row) in list.iter().zip(&mut back) {
                 row.push(read(&field, hop.to.grasp));
@@ -187,6 +187,26 @@ impl Hops {
             })
         });
         Some(ends.max().unwrap_or(0))
+    }
+
+    /// By move of an order: when its robot has to be home again, if that is its last one; else when
+    /// it would have to be, so that all is done before `limit`.
+    pub(crate) fn home_by(&self, order: &[Item], limit: Time) -> Vec<Time> {
+        let mut next = Vec::new();
+        let moves: Vec<(usize, usize)> = self.moves_of(order, &mut next).collect();
+        // By robot: the move that comes next, and what it takes at least from its approach until
+        // the robot is home for good, beyond the approach itself.
+        let mut later: [Option<(usize, Time)>; MAX_ROBOTS] = [None; MAX_ROBOTS];
+        let mut home_by = vec![limit; order.len()];
+        for (place, &(hop, robot)) in moves.iter().enumerate().rev() {
+            let back = self.back[hop][robot];
+            let ahead = later[robot].map_or(back, |(next, takes)| {
+                self.between[hop][next].saturating_add(takes)
+            });
+            home_by[place] = limit.saturating_sub(ahead.saturating_sub(back));
+            later[robot] = Some((hop, self.transfer[hop].saturating_add(ahead)));
+        }
+        home_by
     }
 }
 

@@ -19,8 +19,12 @@ use scene::{Event, ROBOT_ALONE, Scene, Vec2};
 use crate::anytime::ground::{EVER, Ground, Time, duration};
 use crate::anytime::joint::JointMove;
 use crate::anytime::route::{Leg, Piece, Quest, Router, Target, Then};
-use crate::anytime::timeline::{Owner, Timeline};
-use crate::anytime::track::{Deed, Move, Place, Rest, Start, Track, grips_in_turn};
+use crate::anytime::shortest::JointStep;
+use crate::anytime::timeline::{Owner, Resting, Timeline};
+use crate::anytime::track::{Deed, Left, Move, Place, Rest, Start, Track, grips_in_turn};
+
+/// No object.
+const NOTHING: Resting = (Owner::MAX, 0);
 
 /// The plan.
 pub(crate) struct Plan {
@@ -30,8 +34,6 @@ pub(crate) struct Plan {
     tracks: Vec<Track>,
     rests: Vec<Rest>,
     way: Vec<Piece>,
-    /// Plans that take this long or longer are not looked for.
-    limit: Time,
     /// Whether a move may leave its robot elsewhere than at home.
     pub(crate) leaves_away: bool,
 }
@@ -45,23 +47,20 @@ impl Plan {
             tracks: Vec::new(),
             rests: Vec::new(),
             way: Vec::new(),
-            limit: EVER,
             leaves_away: false,
         }
     }
 
     /// Nothing committed but what is done whatever is planned. That waits for nothing that is
     /// planned now, so it comes first wherever both need the same space.
-    pub(crate) fn begin(&mut self, ground: &Ground, start: &Start, limit: Time) {
+    pub(crate) fn begin(&mut self, ground: &Ground, start: &Start) {
         self.lay(ground, start);
-        self.limit = limit;
         if start.robots.iter().any(|track| track.kept > 0) {
             self.timeline.let_pass(self.robots);
         }
     }
 
     fn lay(&mut self, ground: &Ground, start: &Start) {
-        self.limit = EVER;
         self.timeline.clear();
         self.tracks.clone_from(&start.robots);
         for (robot, track) in self.tracks.iter().enumerate() {
@@ -69,18 +68,21 @@ impl Plan {
                 enter(&mut self.timeline, ground, robot as Owner, track);
             }
         }
+        let mut turns: Vec<u32> = start.objects.iter().map(|(_, turns)| *turns).collect();
         for (object, (place, _)) in start.objects.iter().enumerate() {
-            let owner = self.robots + object as u32;
+            let resting = (self.robots + object as u32, turns[object]);
             for (class, cells) in place.cells.iter().enumerate() {
-                self.timeline.occupy(class, cells, owner, 0);
+                self.timeline.occupy(class, cells, resting, 0);
             }
         }
         for grip in grips_in_turn(&start.robots) {
             let owner = self.robots + grip.object as u32;
+            turns[grip.object] += u32::from(grip.is_release);
             for (class, cells) in grip.place.cells.iter().enumerate() {
                 if grip.is_release {
                     let down = grip.time - ground.release;
-                    self.timeline.occupy(class, cells, owner, down);
+                    let resting = (owner, turns[grip.object]);
+                    self.timeline.occupy(class, cells, resting, down);
                 } else {
                     let up = grip.time - ground.grasp;
                     self.timeline.vacate(class, cells, owner, up);
@@ -89,11 +91,14 @@ impl Plan {
         }
         self.rests = start.rests();
         for track in &mut self.tracks {
-            let (cell, time, _) = track.free;
-            let is_around = |rest: &Rest| {
-                rest.since <= time && rest.place.cells[ROBOT_ALONE.0].binary_search(&cell).is_ok()
-            };
-            track.free.2 = self.rests.iter().position(is_around);
+            let (cell, time) = track.free;
+            let is_around = |rest: &Rest| rest.since <= time && rest.place.has_in_its_room(cell);
+            let around = self.rests.iter().position(is_around);
+            track.left = around.map(|object| Left {
+                object,
+                turns: self.rests[object].turns,
+                place: Rc::clone(&self.rests[object].place),
+            });
         }
     }
 
@@ -119,11 +124,6 @@ impl Plan {
         self.homes[robot]
     }
 
-    /// Whether some robot releases its last object later than `limit`, or at it.
-    pub(crate) fn is_past(&self, limit: Time) -> bool {
-        self.tracks.iter().any(|track| track.free.1 >= limit)
-    }
-
     /// Whether a robot ends at home.
     pub(crate) fn ends_at_home(&self, robot: usize) -> bool {
         self.tracks[robot].end.0 == self.homes[robot]
@@ -146,6 +146,26 @@ impl Plan {
             self.put_tail_back(ground, robot, tail);
         }
         found
+    }
+
+    /// Commits a move the way it was found after the same moves before; when it is done with the
+    /// release, or `None` if that is too late. Then nothing has changed.
+    pub(crate) fn commit_known(
+        &mut self,
+        ground: &Ground,
+        wanted: &Move,
+        way: &[Piece],
+    ) -> Option<Time> {
+        if way.last()?.end() >= wanted.home_by {
+            return None;
+        }
+        self.take_tail(ground, wanted.robot);
+        Some(self.enter_way(ground, wanted.robot, way, Some(wanted)))
+    }
+
+    /// The way of the move that was committed last.
+    pub(crate) fn way(&self) -> &[Piece] {
+        &self.way
     }
 
     fn try_from(
@@ -177,9 +197,9 @@ impl Plan {
     /// The legs of a move that begins where the robot's tail does; its object is put down no
     /// earlier than `clear`.
     fn legs(&self, ground: &mut Ground, scene: &Scene, wanted: &Move, clear: Time) -> [Leg; 3] {
-        let (_, _, left) = self.tracks[wanted.robot].free;
-        let (moved, nobody) = (self.owner(Some(wanted.object)), self.owner(None));
+        let left = self.tracks[wanted.robot].left.as_ref();
         let rest = &self.rests[wanted.object];
+        let moved = self.resting(wanted.object, rest.turns);
         let (alone, carrying) = (ROBOT_ALONE.0, ground.carrying(wanted.object, wanted.to.by));
         let mut to =
             |class: usize, cell: u32| Target::Place(cell, ground.field(scene, class, cell));
@@ -188,34 +208,34 @@ impl Plan {
                 class: alone,
                 target: to(alone, rest.place.grasps[wanted.to.by as usize]),
                 then: Then::Grasp(rest.since.max(wanted.after.0)),
-                closed: self.closed_by(&[Some(wanted.object), left]),
-                own: [moved, self.owner(left)],
+                closed: closed_by([Some(&rest.place), left.map(|left| &left.place)]),
+                own: [moved, self.left_by(wanted.robot)],
             },
             Leg {
                 class: carrying,
                 target: to(carrying, wanted.to.grasp),
                 then: Then::Release(clear.max(wanted.after.1)),
                 closed: Vec::new(),
-                own: [moved, nobody],
+                own: [moved, NOTHING],
             },
             Leg {
                 class: alone,
                 target: to(alone, self.homes[wanted.robot]),
                 then: Then::Stay,
                 closed: wanted.to.bare.to_vec(),
-                own: [moved, nobody],
+                own: [moved, NOTHING],
             },
         ]
     }
 
     fn quest<'a>(&self, wanted: &Move, legs: &'a [Leg], ignoring_parked: Owner) -> Quest<'a> {
-        let (from, time, _) = self.tracks[wanted.robot].free;
+        let (from, time) = self.tracks[wanted.robot].free;
         Quest {
             robot: wanted.robot as Owner,
             from,
             time,
             legs,
-            limit: self.limit,
+            limit: wanted.home_by,
             ignoring_parked,
         }
     }
@@ -240,48 +260,52 @@ impl Plan {
         after
     }
 
-    /// Takes moves over that are made one at a time, a step of one robot after the other.
+    /// Takes steps over that are made one after the other, each by some robots at the same time.
     pub(crate) fn replay(
         &mut self,
         scene: &Scene,
         ground: &Ground,
         start: &Start,
-        moves: &[(usize, JointMove)],
+        steps: &[JointStep],
     ) {
         let mut start = start.clone();
         let mut rests = start.rests();
         let ends = start.robots.iter().map(|track| track.end.1);
         let mut now = ends.max().unwrap_or(0);
-        for &(robot, made) in moves {
-            let track = &mut start.robots[robot];
-            let cell = &mut track.end.0;
+        for step in steps {
             let before = now;
-            now += match made {
-                JointMove::Step(direction) => duration(direction as usize),
-                JointMove::Grasp(_) => ground.grasp,
-                JointMove::Release(_) => ground.release,
-            };
-            let deed = match made {
-                JointMove::Step(direction) => {
-                    *cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
-                    Deed::Step(direction, before, now)
-                }
-                JointMove::Grasp(object) => {
-                    let rest = &rests[object as usize];
-                    track.stops.push(rest.place.held(0));
-                    Deed::Grasped(u32::from(object), rest.turns, now, 0)
-                }
-                JointMove::Release(object) => {
-                    let rest = &mut rests[object as usize];
-                    let at = ground.at(*cell) - scene.objects[object as usize].grasp;
-                    rest.place = Place::of(scene, ground, object as usize, at);
-                    rest.turns += 1;
-                    track.stops.push(Rc::clone(&rest.place));
-                    Deed::Released(u32::from(object), now)
-                }
-            };
-            track.deeds.push(deed);
-            track.end.1 = now;
+            for &(robot, made) in step {
+                let track = &mut start.robots[robot];
+                let cell = &mut track.end.0;
+                let done = before
+                    + match made {
+                        JointMove::Step(direction) => duration(direction as usize),
+                        JointMove::Grasp(_) => ground.grasp,
+                        JointMove::Release(_) => ground.release,
+                    };
+                let deed = match made {
+                    JointMove::Step(direction) => {
+                        *cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
+                        Deed::Step(direction, before, done)
+                    }
+                    JointMove::Grasp(object) => {
+                        let rest = &rests[object as usize];
+                        track.stops.push(rest.place.held(0));
+                        Deed::Grasped(u32::from(object), rest.turns, done, 0)
+                    }
+                    JointMove::Release(object) => {
+                        let rest = &mut rests[object as usize];
+                        let at = ground.at(*cell) - scene.objects[object as usize].grasp;
+                        rest.place = Place::of(scene, ground, object as usize, at);
+                        rest.turns += 1;
+                        track.stops.push(Rc::clone(&rest.place));
+                        Deed::Released(u32::from(object), done)
+                    }
+                };
+                track.deeds.push(deed);
+                track.end.1 = done;
+                now = now.max(done);
+            }
         }
         self.lay(ground, &start);
     }
@@ -305,13 +329,14 @@ impl Plan {
         target: Target,
     ) -> Option<Time> {
         let tail = self.take_tail(ground, robot);
-        let (from, time, left) = self.tracks[robot].free;
+        let (from, time) = self.tracks[robot].free;
+        let left = self.tracks[robot].left.as_ref();
         let legs = [Leg {
             class: ROBOT_ALONE.0,
             target,
             then: Then::Stay,
-            closed: self.closed_by(&[left]),
-            own: [self.owner(left), self.owner(None)],
+            closed: closed_by([left.map(|left| &left.place), None]),
+            own: [self.left_by(robot), NOTHING],
         }];
         let quest = Quest {
             robot: robot as Owner,
@@ -360,20 +385,14 @@ impl Plan {
         None
     }
 
-    fn owner(&self, object: Option<usize>) -> Owner {
-        object.map_or(Owner::MAX, |object| self.robots + object as u32)
+    fn resting(&self, object: usize, turns: u32) -> Resting {
+        (self.robots + object as u32, turns)
     }
 
-    /// Cells that a robot may not enter for objects whose reservations are looked at apart.
-    fn closed_by(&self, objects: &[Option<usize>]) -> Vec<u32> {
-        let mut closed: Vec<u32> = objects
-            .iter()
-            .flatten()
-            .flat_map(|&object| self.rests[object].place.bare.iter().copied())
-            .collect();
-        closed.sort_unstable();
-        closed.dedup();
-        closed
+    /// The object in whose room a robot's tail begins.
+    fn left_by(&self, robot: usize) -> Resting {
+        let left = self.tracks[robot].left.as_ref();
+        left.map_or(NOTHING, |left| self.resting(left.object, left.turns))
     }
 
     /// The earliest time from which an object may stand at a place for ever, or who is parked
@@ -420,7 +439,7 @@ impl Plan {
     fn take_tail(&mut self, ground: &Ground, robot: usize) -> Vec<Deed> {
         let track = &mut self.tracks[robot];
         let tail = track.deeds.split_off(track.tail);
-        let (cell, time, _) = track.free;
+        let (cell, time) = track.free;
         let who = (robot as Owner, ROBOT_ALONE.0);
         let directions = tail.iter().filter_map(Deed::direction);
         self.timeline.take_back(ground, who, cell, directions, time);
@@ -429,7 +448,7 @@ impl Plan {
 
     fn put_tail_back(&mut self, ground: &Ground, robot: usize, tail: Vec<Deed>) {
         let track = &mut self.tracks[robot];
-        let (cell, time, _) = track.free;
+        let (cell, time) = track.free;
         let owner = robot as Owner;
         let mut walker = self
             .timeline
@@ -458,7 +477,7 @@ impl Plan {
     ) -> Time {
         let owner = robot as Owner;
         let track = &mut self.tracks[robot];
-        let (mut cell, begin, left) = track.free;
+        let (mut cell, begin) = track.free;
         let mut walker = self
             .timeline
             .enter(ground, owner, ROBOT_ALONE.0, cell, begin);
@@ -466,7 +485,6 @@ impl Plan {
         let mut holds = false;
         if wanted.is_none() {
             track.tail = track.deeds.len();
-            track.free = (cell, begin, left);
         }
         for piece in way {
             let number = track.deeds.len() as u32;
@@ -488,16 +506,21 @@ impl Plan {
                         self.timeline.leave(ground, &walker, end, number);
                         walker = self.timeline.enter(ground, owner, ROBOT_ALONE.0, cell, end);
                         let down = end - ground.release;
-                        for (class, cells) in wanted.to.cells.iter().enumerate() {
-                            self.timeline.occupy(class, cells, id, down);
-                        }
                         rest.place = Rc::clone(&wanted.to);
                         rest.since = end;
                         rest.turns += 1;
+                        for (class, cells) in wanted.to.cells.iter().enumerate() {
+                            self.timeline.occupy(class, cells, (id, rest.turns), down);
+                        }
                         track.stops.push(Rc::clone(&wanted.to));
                         track.deeds.push(Deed::Released(object as u32, end));
                         track.tail = track.deeds.len();
-                        track.free = (cell, end, Some(object));
+                        track.free = (cell, end);
+                        track.left = wanted.to.has_in_its_room(cell).then(|| Left {
+                            object,
+                            turns: rest.turns,
+                            place: Rc::clone(&wanted.to),
+                        });
                     } else {
                         let up = end - ground.grasp;
                         self.timeline.leave(ground, &walker, up, number);
@@ -522,6 +545,17 @@ impl Plan {
         track.end = (cell, now);
         if wanted.is_some() { track.free.1 } else { now }
     }
+}
+
+/// Cells that a robot may not enter for objects whose reservations are looked at apart.
+fn closed_by(places: [Option<&Rc<Place>>; 2]) -> Vec<u32> {
+    let places = places.into_iter().flatten();
+    let mut closed: Vec<u32> = places
+        .flat_map(|place| place.bare.iter().copied())
+        .collect();
+    closed.sort_unstable();
+    closed.dedup();
+    closed
 }
 
 /// Enters all that a robot does.

@@ -14,7 +14,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use crate::anytime::ground::{EVER, Field, Ground, Time, duration};
-use crate::anytime::timeline::{Gap, Owner, Skip, Timeline};
+use crate::anytime::timeline::{Gap, Owner, Resting, Skip, Timeline};
 use crate::search::DIRECTIONS;
 
 /// What the grip does at the end of a leg.
@@ -45,8 +45,9 @@ pub(crate) struct Leg {
     pub(crate) then: Then,
     /// Cells closed to this leg beside what is reserved, sorted: its own objects on the ground.
     pub(crate) closed: Vec<u32>,
-    /// Whose reservations do not count: the object that is moved, one that was just put down.
-    pub(crate) own: [Owner; 2],
+    /// Whose reservations do not count: the object that is moved, where it is taken from, and one
+    /// that was just put down.
+    pub(crate) own: [Resting; 2],
 }
 
 /// A way that was asked for.
@@ -356,10 +357,19 @@ impl Router {
 
 impl Quest<'_> {
     fn skip(&self, leg: usize) -> Skip {
-        let [one, other] = self.legs[leg].own;
         Skip {
-            own: [self.robot, one, other],
+            robot: self.robot,
+            resting: self.legs[leg].own,
             parked_below: self.ignoring_parked,
+        }
+    }
+}
+
+impl Piece {
+    /// When it is done.
+    pub(crate) const fn end(self) -> Time {
+        match self {
+            Self::Step(_, _, end) | Self::Grip(end) => end,
         }
     }
 }

@@ -16,13 +16,17 @@ use shm_types::Verdict;
 
 use crate::anytime::ground::{EVER, Ground, Time};
 use crate::anytime::joint::{Found, Joint, JointMove};
+use crate::anytime::known::Known;
 use crate::anytime::order::{Clocks, Hops, Item};
 use crate::anytime::plan::Plan;
 use crate::anytime::route::Router;
 use crate::anytime::sequence::{Sequencer, Step};
+use crate::anytime::shortest::{JointStep, Least, Shortest};
 use crate::anytime::situation::Situation;
 use crate::anytime::track::{Move, Place, Start, Track};
-use crate::anytime::{UNITS_PER_CONFIGURATION, UNITS_PER_INTERVAL};
+use crate::anytime::{
+    UNITS_PER_CONFIGURATION, UNITS_PER_INTERVAL, UNITS_PER_PIECE, UNITS_PER_SMALL_CONFIGURATION,
+};
 
 /// Most distances that are kept: one for each lattice point and place that somebody goes to, 4
 /// bytes each.
@@ -30,12 +34,15 @@ const MOST_DISTANCES: usize = 1 << 28;
 /// Configurations that the complete search looks at in one go.
 const CONFIGURATIONS_PER_SLICE: usize = 5_000;
 
+/// Moves, and an order of them.
+pub(super) type Source = (Rc<Hops>, Vec<Item>);
+
 /// A plan.
 #[derive(Clone)]
 pub(super) struct Best {
     pub(super) makespan: Time,
-    /// The order it came from; empty if it is the complete search's own.
-    pub(super) order: Vec<Item>,
+    /// What it came from; none if it is the complete search's own.
+    pub(super) source: Option<Source>,
     tracks: Vec<Track>,
 }
 
@@ -79,26 +86,32 @@ pub(crate) struct Solver {
     pub(crate) ground: Ground,
     router: Router,
     pub(crate) plan: Plan,
-    start: Start,
+    pub(super) start: Start,
     pub(super) homes: Vec<u32>,
     goals: Vec<Option<Rc<Place>>>,
     sequencer: Sequencer,
     joint: Option<Box<Joint>>,
     /// Configurations that the complete search has seen.
     configurations: u64,
-    pub(super) hops: Option<Hops>,
+    shortest: Option<Box<Shortest>>,
+    /// Configurations that the search for a shortest plan has seen.
+    small_configurations: u64,
     pub(super) random: ChaCha8Rng,
     pub(super) best: Option<Best>,
     /// The one that robots follow.
     followed: Option<Best>,
     /// Where orders are looked for: near this one.
-    pub(super) current: Vec<Item>,
+    pub(super) current: Option<Source>,
     /// How often in a row nothing was left to try nearby.
     pub(super) misses: u32,
     /// How often improving was tried.
     pub(super) turn: u32,
     pub(super) tried: HashSet<Vec<Item>>,
     pub(crate) decoded: u64,
+    /// Units spent on looking at orders, and on making moves again that were found before.
+    pub(super) weighing: u64,
+    /// Ways of the moves of orders tried before, from the present start and as `mode` says.
+    known: Known,
     mode: Mode,
     /// Whether the plan begins where the scene does.
     pub(crate) is_start: bool,
@@ -152,15 +165,18 @@ impl Solver {
             goals,
             joint: None,
             configurations: 0,
-            hops: None,
+            shortest: None,
+            small_configurations: 0,
             random: ChaCha8Rng::seed_from_u64(1),
             best: None,
             followed: None,
-            current: Vec::new(),
+            current: None,
             misses: 0,
             turn: 0,
             tried: HashSet::new(),
             decoded: 0,
+            weighing: 0,
+            known: Known::default(),
             mode: MODES[0],
             is_start: situation.is_start,
             is_short: situation.is_short(),
@@ -182,7 +198,9 @@ impl Solver {
         let floods = self.ground.counters.cells_expanded + self.sequencer.cells;
         self.router.expanded * UNITS_PER_INTERVAL
             + floods
+            + self.weighing
             + self.configurations * UNITS_PER_CONFIGURATION
+            + self.small_configurations * UNITS_PER_SMALL_CONFIGURATION
     }
 
     /// A first plan: a sequence, then its moves by whoever can make them soonest. Other attempts
@@ -232,16 +250,17 @@ impl Solver {
         let mut found = None;
         for mode in MODES {
             self.mode = mode;
+            self.known.clear();
             found = self.greedy(scene, &hops, &objects);
             if found.is_some() {
                 break;
             }
         }
-        self.hops = Some(hops);
         let (makespan, order) = found?;
         self.tried.insert(order.clone());
-        self.current.clone_from(&order);
-        Some(self.keep(makespan, order))
+        self.current = Some((Rc::new(hops), order));
+        let source = self.current.clone();
+        Some(self.keep(makespan, source))
     }
 
     /// A first plan by the complete search, a slice of it: nothing while it goes on, then whether
@@ -297,17 +316,46 @@ impl Solver {
         if let Some(makespan) = self.begin_with(scene, &sequence) {
             return makespan;
         }
-        self.plan.replay(scene, &self.ground, &self.start, &moves);
-        self.hops = None;
-        self.keep(self.plan.makespan(), Vec::new())
+        let steps = moves.into_iter().map(|made| vec![made]);
+        let steps: Vec<JointStep> = steps.collect();
+        self.plan.replay(scene, &self.ground, &self.start, &steps);
+        self.keep(self.plan.makespan(), None)
+    }
+
+    /// Looks for a plan with fewer steps than the best one, a slice of the search. False once it is
+    /// over, or if the room is none that it can be made for.
+    pub(crate) fn shorten(&mut self, scene: &Scene) -> bool {
+        let Some(best) = &self.best else { return false };
+        let shortest = self.shortest.take().or_else(|| {
+            let (ground, start, homes) = (&self.ground, &self.start, &self.homes);
+            let found = Shortest::new(scene, ground, start, homes, &self.goals, best.makespan);
+            found.map(Box::new)
+        });
+        let Some(mut shortest) = shortest else {
+            return false;
+        };
+        let found = shortest.advance(&self.ground, CONFIGURATIONS_PER_SLICE);
+        self.small_configurations = shortest.seen() as u64;
+        match found {
+            Least::Open => {
+                self.shortest = Some(shortest);
+                return true;
+            }
+            Least::NoneShorter | Least::TooMany => {}
+            Least::Plan(steps) => {
+                self.plan.replay(scene, &self.ground, &self.start, &steps);
+                self.keep(self.plan.makespan(), None);
+            }
+        }
+        false
     }
 
     /// Keeps the plan as the best one.
-    pub(super) fn keep(&mut self, makespan: Time, order: Vec<Item>) -> Time {
+    pub(super) fn keep(&mut self, makespan: Time, source: Option<Source>) -> Time {
         let tracks = self.plan.tracks().to_vec();
         self.best = Some(Best {
             makespan,
-            order,
+            source,
             tracks,
         });
         makespan
@@ -320,9 +368,7 @@ impl Solver {
         hops: &Hops,
         sequence: &[u32],
     ) -> Option<(Time, Vec<Item>)> {
-        self.decoded += 1;
-        self.plan.begin(&self.ground, &self.start, EVER);
-        self.plan.leaves_away = self.mode.leaves_away;
+        self.begin();
         let mut left = sequence.to_vec();
         let mut clocks = Clocks::new(hops);
         let mut order: Vec<Item> = Vec::new();
@@ -342,7 +388,7 @@ impl Solver {
             let mut candidates = BinaryHeap::from(candidates);
             let taken =
                 std::iter::from_fn(|| candidates.pop()).find(|&Reverse((_, place, robot))| {
-                    self.commit(scene, hops, &order, (left[place], robot as u32))
+                    self.commit(scene, hops, &order, (left[place], robot as u32), EVER)
                 });
             let Reverse((_, place, robot)) = taken?;
             let object = left.remove(place);
@@ -352,13 +398,24 @@ impl Solver {
         Some((self.send_all_home(scene)?, order))
     }
 
-    /// Commits the next move of an object, after those of `order`.
+    /// Nothing committed.
+    fn begin(&mut self) {
+        self.decoded += 1;
+        self.plan.begin(&self.ground, &self.start);
+        self.plan.leaves_away = self.mode.leaves_away;
+        if !self.mode.makes_room {
+            self.known.begin();
+        }
+    }
+
+    /// Commits the next move of an object, after those of `order`; whether there is a way.
     fn commit(
         &mut self,
         scene: &Scene,
         hops: &Hops,
         order: &[Item],
         (object, robot): Item,
+        home_by: Time,
     ) -> bool {
         let made = order.iter().filter(|item| item.0 == object).count();
         let hop = &hops.list[hops.of[object as usize].0 + made];
@@ -367,17 +424,28 @@ impl Solver {
             object: object as usize,
             to: Rc::clone(&hop.to),
             after: self.plan.user_order(scene, object as usize, hop.to.at),
+            home_by,
         };
         let (plan, ground, router) = (&mut self.plan, &mut self.ground, &mut self.router);
-        let done = if self.mode.makes_room {
-            plan.commit_making_room(ground, router, scene, &wanted)
-        } else {
-            plan.commit(ground, router, scene, &wanted)
+        if self.mode.makes_room {
+            let done = plan.commit_making_room(ground, router, scene, &wanted);
+            return done.is_some();
+        }
+        let known = self.known.way(&wanted);
+        let done = match &known {
+            Some(way) => {
+                self.weighing += way.len() as u64 * UNITS_PER_PIECE;
+                plan.commit_known(ground, &wanted, way)
+            }
+            None => plan.commit(ground, router, scene, &wanted),
         };
+        if done.is_some() {
+            self.known.commit(&wanted, plan.way());
+        }
         done.is_some()
     }
 
-    /// Carries an order out in the plan; how long it takes, if it can be done within `limit`.
+    /// Carries an order out in the plan; how long it takes, if that is less than `limit`.
     pub(super) fn decode(
         &mut self,
         scene: &Scene,
@@ -385,11 +453,10 @@ impl Solver {
         order: &[Item],
         limit: Time,
     ) -> Option<Time> {
-        self.decoded += 1;
-        self.plan.begin(&self.ground, &self.start, limit);
-        self.plan.leaves_away = self.mode.leaves_away;
+        self.begin();
+        let home_by = hops.home_by(order, limit);
         for (place, &item) in order.iter().enumerate() {
-            if !self.commit(scene, hops, &order[..place], item) || self.plan.is_past(limit) {
+            if !self.commit(scene, hops, &order[..place], item, home_by[place]) {
                 return None;
             }
         }
@@ -420,7 +487,10 @@ impl Solver {
         scene: &Scene,
         kept: impl FnOnce(&[Track]) -> Vec<usize>,
     ) -> bool {
-        let (Some(followed), Some(hops)) = (self.followed.clone(), self.hops.take()) else {
+        let Some(followed) = self.followed.clone() else {
+            return false;
+        };
+        let Some((hops, followed_order)) = &followed.source else {
             return false;
         };
         let kept = kept(&followed.tracks);
@@ -438,7 +508,7 @@ impl Solver {
         let mut made = vec![0; kept.len()];
         let mut order = Vec::new();
         let mut sequence: Vec<Step> = Vec::new();
-        for &(object, robot) in &followed.order {
+        for &(object, robot) in followed_order {
             let index = object as usize;
             if made[index] >= kept[index] {
                 let hop = hops.of[index].0 + made[index] as usize;
@@ -450,12 +520,16 @@ impl Solver {
         if order.is_empty() {
             return false;
         }
+        self.known.clear();
         let (start, homes) = (&self.start, &self.homes);
-        self.hops = Some(Hops::new(scene, &mut self.ground, start, homes, &sequence));
-        self.current.clone_from(&order);
+        let hops = Hops::new(scene, &mut self.ground, start, homes, &sequence);
+        self.current = Some((Rc::new(hops), order));
         self.tried.clear();
         self.misses = 0;
-        self.best = Some(Best { order, ..followed });
+        self.best = Some(Best {
+            source: self.current.clone(),
+            ..followed
+        });
         self.followed.clone_from(&self.best);
         true
     }

@@ -19,15 +19,21 @@ pub(crate) struct Busy {
     pub(crate) from: Time,
     pub(crate) to: Time,
     pub(crate) owner: Owner,
-    /// Number of the owner's step at whose end the point is free again.
+    /// Number of the owner's step at whose end the point is free again; of an object, how often it
+    /// had been put down.
     pub(crate) step: u32,
 }
+
+/// An object at rest, where it was left when it was put down for the time of this number.
+pub(crate) type Resting = (Owner, u32);
 
 /// Spans that do not count.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Skip {
-    /// Those of the robot itself, and of objects that are looked at apart.
-    pub(crate) own: [Owner; 3],
+    /// Those of the robot itself.
+    pub(crate) robot: Owner,
+    /// Those of objects that are looked at apart, but only where they are left then.
+    pub(crate) resting: [Resting; 2],
     /// Robots below this number that are parked for ever. None, if 0: with it a search tells who
     /// is in the way.
     pub(crate) parked_below: Owner,
@@ -36,7 +42,9 @@ pub(crate) struct Skip {
 impl Skip {
     #[inline]
     fn has(self, busy: &Busy) -> bool {
-        self.own.contains(&busy.owner) || busy.to == EVER && busy.owner < self.parked_below
+        busy.owner == self.robot
+            || self.resting.contains(&(busy.owner, busy.step))
+            || busy.to == EVER && busy.owner < self.parked_below
     }
 }
 
@@ -271,14 +279,20 @@ impl Timeline {
         }
     }
 
-    /// Enters that `owner` keeps a class away from these cells.
-    pub(crate) fn occupy(&mut self, class: usize, cells: &[u32], owner: Owner, from: Time) {
+    /// Enters that an object keeps a class away from these cells.
+    pub(crate) fn occupy(
+        &mut self,
+        class: usize,
+        cells: &[u32],
+        (owner, turn): Resting,
+        from: Time,
+    ) {
         for &cell in cells {
             let busy = Busy {
                 from,
                 to: EVER,
                 owner,
-                step: 0,
+                step: turn,
             };
             self.add(self.index(class, cell), busy);
         }

@@ -58,8 +58,10 @@ pub(crate) struct Track {
     pub(crate) kept: usize,
     /// Deeds from here on are its tail.
     pub(crate) tail: usize,
-    /// Where and when the tail begins, and the object that stands there.
-    pub(crate) free: (u32, Time, Option<usize>),
+    /// Where and when the tail begins.
+    pub(crate) free: (u32, Time),
+    /// The object in whose room it begins.
+    pub(crate) left: Option<Left>,
     /// Where and when it ends.
     pub(crate) end: (u32, Time),
 }
@@ -72,6 +74,9 @@ pub(crate) struct Move {
     pub(crate) to: Rc<Place>,
     /// When it may be grasped, and released, by the user's own order.
     pub(crate) after: (Time, Time),
+    /// When the robot has to be home again, if that is its last move; else when it would have to
+    /// be, so that its other moves can follow in time.
+    pub(crate) home_by: Time,
 }
 
 /// What a plan starts from.
@@ -94,6 +99,15 @@ pub(crate) struct Rest {
     pub(crate) grasped: Option<Time>,
 }
 
+/// An object that was put down, and not moved since as far as its robot knows.
+#[derive(Clone, Debug)]
+pub(crate) struct Left {
+    pub(crate) object: usize,
+    /// How often it had been put down.
+    pub(crate) turns: u32,
+    pub(crate) place: Rc<Place>,
+}
+
 /// A grip in a track.
 pub(crate) struct GripAt<'a> {
     pub(crate) time: Time,
@@ -107,6 +121,11 @@ impl Place {
     /// Whether a robot can stand where it is grasped, by one grasp at least.
     pub(crate) fn is_open(&self) -> bool {
         self.open_grasps().next().is_some()
+    }
+
+    /// Whether a robot without an object that is at this cell is in its room.
+    pub(crate) fn has_in_its_room(&self, cell: u32) -> bool {
+        self.cells[ROBOT_ALONE.0].binary_search(&cell).is_ok()
     }
 
     /// Where robots can stand that grasp it.
@@ -183,7 +202,8 @@ impl Track {
             stops: Vec::new(),
             kept: 0,
             tail: 0,
-            free: (cell, 0, None),
+            free: (cell, 0),
+            left: None,
             end: (cell, 0),
         }
     }
@@ -208,7 +228,8 @@ impl Track {
             stops: self.stops[..grips].to_vec(),
             kept,
             tail: kept,
-            free: (cell, now, None),
+            free: (cell, now),
+            left: None,
             end: (cell, now),
         }
     }

@@ -48,7 +48,7 @@ impl Plan {
 
     /// Where a way leads, and as which class.
     fn bodies(&self, ground: &Ground, wanted: &Move, way: &[Piece]) -> Vec<(u32, usize)> {
-        let (mut cell, _, _) = self.tracks[wanted.robot].free;
+        let (mut cell, _) = self.tracks[wanted.robot].free;
         let mut class = ROBOT_ALONE.0;
         let mut bodies = vec![(cell, class)];
         for piece in way {

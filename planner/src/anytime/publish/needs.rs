@@ -46,7 +46,8 @@ pub(super) fn needs_of(ground: &Ground, plan: &Plan, robot: u32, track: &Track) 
         let mut look = |class: usize, at: u32| {
             for busy in plan.timeline().busy(class, at) {
                 let other = busy.owner as usize;
-                if busy.owner != robot && other < robots && busy.to <= depart {
+                // Who is there before leaves it in time, or at the same time and the same way.
+                if busy.owner != robot && other < robots && busy.from <= depart {
                     let before: &mut Option<u32> = &mut waited_for[other];
                     if before.is_none_or(|before| before < busy.step) {
                         *before = Some(busy.step);

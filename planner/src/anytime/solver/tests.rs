@@ -5,7 +5,7 @@ use super::*;
 use crate::anytime::keep::kept;
 use crate::anytime::plan::enter;
 use crate::anytime::timeline::Timeline;
-use crate::anytime::track::Deed;
+use crate::anytime::track::{Deed, grips_in_turn};
 
 /// When robots keep others away from where: class, cell, robot, from, to.
 type Span = (usize, u32, u32, Time, Time);
@@ -105,4 +105,69 @@ fn assert_kept_first(solver: &Solver, seed: u64) -> usize {
         }
     }
     shared
+}
+
+/// Where an object rests, from when to when.
+type Rested = (Rc<Place>, Time, Time);
+
+#[test]
+fn nobody_passes_through_an_object_at_rest() {
+    let mut moved_again = 0;
+    for seed in 40..52 {
+        let options = scene::GenerateOptions {
+            seed,
+            objects: 6,
+            robots: 4,
+            area_m2: 40.0,
+            walls: 5,
+            ..scene::GenerateOptions::default()
+        };
+        let (scene, mut solver, _) = planned(&options);
+        for _ in 0..60 {
+            solver.improve(&scene);
+            let (ground, tracks) = (&solver.ground, solver.plan.tracks());
+            let rested = rested(&solver);
+            moved_again += usize::from(rested.len() > 2 * scene.objects.len());
+            for (robot, track) in tracks.iter().enumerate() {
+                let (mut cell, mut class) = (track.start, ROBOT_ALONE.0);
+                for deed in &track.deeds {
+                    match *deed {
+                        Deed::Step(direction, depart, arrive) => {
+                            cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
+                            let is_there = |(place, since, until): &&Rested| {
+                                *since < arrive
+                                    && depart < *until
+                                    && place.cells[class].binary_search(&cell).is_ok()
+                            };
+                            let through = rested.iter().find(is_there);
+                            assert!(through.is_none(), "{seed}: robot {robot} at {depart}");
+                        }
+                        Deed::Grasped(object, .., by) => {
+                            class = ground.carrying(object as usize, by);
+                        }
+                        Deed::Released(..) => class = ROBOT_ALONE.0,
+                    }
+                }
+            }
+        }
+    }
+    assert!(moved_again > 0, "something is set aside");
+}
+
+/// Where objects rest in the plan.
+fn rested(solver: &Solver) -> Vec<Rested> {
+    let mut at: Vec<(Rc<Place>, Time)> = (solver.start.objects.iter())
+        .map(|(place, _)| (Rc::clone(place), 0))
+        .collect();
+    let mut rested = Vec::new();
+    for grip in grips_in_turn(solver.plan.tracks()) {
+        let (place, since) = &mut at[grip.object];
+        if grip.is_release {
+            (*place, *since) = (Rc::clone(grip.place), grip.time);
+        } else {
+            rested.push((Rc::clone(place), *since, grip.time - solver.ground.grasp));
+        }
+    }
+    rested.extend(at.into_iter().map(|(place, since)| (place, since, EVER)));
+    rested
 }
