@@ -18,7 +18,7 @@ use scene::{Event, ROBOT_ALONE, Scene, Vec2};
 
 use crate::anytime::ground::{EVER, Ground, Time, duration};
 use crate::anytime::joint::JointMove;
-use crate::anytime::route::{Leg, Piece, Quest, Router, Target, Then};
+use crate::anytime::route::{Leg, Piece, Quest, Router, Target, Then, sides};
 use crate::anytime::shortest::JointStep;
 use crate::anytime::timeline::{Owner, Resting, Timeline};
 use crate::anytime::track::{Deed, Left, Move, Place, Rest, Start, Track, grips_in_turn};
@@ -408,8 +408,10 @@ impl Plan {
             let meets = |class: usize, cell: u32| place.cells[class].binary_search(&cell).is_ok();
             let mut was_in = meets(class, cell);
             for deed in &track.deeds {
+                let mut beside = None;
                 let until = match *deed {
                     Deed::Step(direction, _, arrive) => {
+                        beside = sides(ground, cell, direction as usize);
                         cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
                         arrive
                     }
@@ -423,7 +425,8 @@ impl Plan {
                     }
                 };
                 let is_in = meets(class, cell);
-                if was_in || is_in {
+                let passes = |beside: [u32; 2]| beside.iter().any(|&side| meets(class, side));
+                if was_in || is_in || beside.is_some_and(passes) {
                     clear = clear.max(until);
                 }
                 was_in = is_in;

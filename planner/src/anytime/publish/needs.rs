@@ -112,3 +112,106 @@ fn find(plan: &Plan, (object, event): (usize, Event)) -> Option<(usize, usize)> 
     };
     found.map(|(_, robot, number)| (robot, number))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::anytime::ground::Time;
+    use crate::anytime::solver::testing::planned;
+
+    /// Where a robot is after a deed: its cell and class, from when to when, and the deed with
+    /// which it leaves.
+    struct Stay {
+        cell: u32,
+        class: usize,
+        from: Time,
+        until: Time,
+        leaves: usize,
+    }
+
+    fn stays(ground: &Ground, track: &Track) -> Vec<Stay> {
+        let (mut cell, mut class, mut from) = (track.start, 0, 0);
+        let mut stays = Vec::new();
+        for (number, deed) in track.deeds.iter().enumerate() {
+            let until = deed.end();
+            stays.push(Stay {
+                cell,
+                class,
+                from,
+                until,
+                leaves: number,
+            });
+            match *deed {
+                Deed::Step(direction, depart, _) => {
+                    cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
+                    from = depart;
+                }
+                Deed::Grasped(object, _, _, by) => {
+                    class = ground.carrying(object as usize, by);
+                    from = until - ground.grasp;
+                }
+                Deed::Released(..) => {
+                    class = 0;
+                    from = until;
+                }
+            }
+        }
+        stays
+    }
+
+    #[test]
+    fn whoever_comes_second_waits_until_the_first_has_left() {
+        let mut waited = 0;
+        for seed in 0..6 {
+            let options = scene::GenerateOptions {
+                seed,
+                crowding: 0.8,
+                ..scene::GenerateOptions::default()
+            };
+            let (scene, mut solver, _) = planned(&options);
+            for _ in 0..5 {
+                solver.improve(&scene);
+                solver.restore().unwrap();
+                waited += assert_in_turn(&solver.ground, &solver.plan);
+            }
+        }
+        assert!(waited > 0, "they never meet");
+    }
+
+    /// Robots meet nobody, and whoever comes second waits for the first; how often.
+    fn assert_in_turn(ground: &Ground, plan: &Plan) -> usize {
+        let mut waited = 0;
+        let tracks = plan.tracks();
+        let all: Vec<Vec<Stay>> = tracks.iter().map(|track| stays(ground, track)).collect();
+        for (robot, track) in tracks.iter().enumerate() {
+            let needs = needs_of(ground, plan, robot as u32, track);
+            for (other, mine, theirs) in pairs(&all, robot) {
+                let meet = ground.meet(mine.class, mine.cell, theirs.class, theirs.cell);
+                if !meet || mine.until <= theirs.from {
+                    continue;
+                }
+                assert!(theirs.until <= mine.from, "{robot} meets {other}");
+                let waits = |need: &Need| {
+                    need.robot as usize == other
+                        && (need.deed as usize) < mine.leaves
+                        && need.until as usize >= theirs.leaves
+                };
+                assert!(needs.iter().any(waits), "{robot} passes before {other}");
+                waited += 1;
+            }
+        }
+        waited
+    }
+
+    /// Each stay of a robot with each of any other one, and that one's number.
+    fn pairs(all: &[Vec<Stay>], robot: usize) -> impl Iterator<Item = (usize, &Stay, &Stay)> {
+        let others = all
+            .iter()
+            .enumerate()
+            .filter(move |(other, _)| *other != robot);
+        others.flat_map(move |(other, theirs)| {
+            let mine = all[robot].iter();
+            mine.flat_map(move |mine| theirs.iter().map(move |theirs| (other, mine, theirs)))
+        })
+    }
+}

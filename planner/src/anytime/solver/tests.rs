@@ -4,6 +4,7 @@ use super::testing::{planned, written};
 use super::*;
 use crate::anytime::keep::kept;
 use crate::anytime::plan::enter;
+use crate::anytime::route::sides;
 use crate::anytime::timeline::Timeline;
 use crate::anytime::track::{Deed, grips_in_turn};
 
@@ -113,17 +114,26 @@ type Rested = (Rc<Place>, Time, Time);
 #[test]
 fn nobody_passes_through_an_object_at_rest() {
     let mut moved_again = 0;
-    for seed in 40..52 {
-        let options = scene::GenerateOptions {
-            seed,
-            objects: 6,
-            robots: 4,
-            area_m2: 40.0,
-            walls: 5,
-            ..scene::GenerateOptions::default()
-        };
+    let crowded = (40..43).map(|seed| scene::GenerateOptions {
+        seed,
+        objects: 6,
+        robots: 4,
+        area_m2: 40.0,
+        walls: 5,
+        ..scene::GenerateOptions::default()
+    });
+    let loose = (1019..1020).map(|seed| scene::GenerateOptions {
+        seed,
+        objects: 8,
+        area_m2: 64.0,
+        walls: 8,
+        crowding: 0.2,
+        ..scene::GenerateOptions::default()
+    });
+    for options in crowded.chain(loose) {
+        let seed = options.seed;
         let (scene, mut solver, _) = planned(&options);
-        for _ in 0..60 {
+        for _ in 0..100 {
             solver.improve(&scene);
             let (ground, tracks) = (&solver.ground, solver.plan.tracks());
             let rested = rested(&solver);
@@ -133,11 +143,14 @@ fn nobody_passes_through_an_object_at_rest() {
                 for deed in &track.deeds {
                     match *deed {
                         Deed::Step(direction, depart, arrive) => {
+                            let beside = sides(ground, cell, direction as usize);
                             cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
+                            let swept = beside.into_iter().flatten().chain([cell]);
                             let is_there = |(place, since, until): &&Rested| {
+                                let cells = &place.cells[class];
                                 *since < arrive
                                     && depart < *until
-                                    && place.cells[class].binary_search(&cell).is_ok()
+                                    && swept.clone().any(|at| cells.binary_search(&at).is_ok())
                             };
                             let through = rested.iter().find(is_there);
                             assert!(through.is_none(), "{seed}: robot {robot} at {depart}");
