@@ -37,8 +37,11 @@ use crate::anytime::situation::{Situation, stands_still};
 use crate::anytime::solver::Solver;
 use crate::proof::Proof;
 
-/// Share of the makespan that is spent on improving the plan before anybody moves.
-const PATIENCE: f64 = 0.01;
+/// Share of the makespan that is spent on improving the plan before anybody moves, for each robot:
+/// more robots have more orders.
+const PATIENCE_PER_ROBOT: f64 = 0.005;
+/// At most.
+const MOST_PATIENCE: f64 = 0.01;
 /// It is given up when this much was spent on the first plan and on improving it, s: with very many
 /// objects one try takes long, and saves little.
 const MOST_BEFORE_MOTION_S: f64 = 1.0;
@@ -372,7 +375,8 @@ impl Anytime {
         let units_per_second = self.settings.units_per_second;
         let units = |s: f64| (s * units_per_second as f64) as u64;
         let better = |solver: &Solver, makespan| {
-            let worth_s = solver.ground.seconds(makespan) * PATIENCE;
+            let patience = PATIENCE_PER_ROBOT * solver.homes.len() as f64;
+            let worth_s = solver.ground.seconds(makespan) * patience.min(MOST_PATIENCE);
             let until = solver.units() + units(worth_s);
             Stage::Better(until.min(units(MOST_BEFORE_MOTION_S)))
         };
