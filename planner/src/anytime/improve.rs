@@ -25,6 +25,8 @@ const DESCENT: usize = 400;
 const WANDERING: usize = 30;
 /// Looking at an order, beyond one for each of its moves, in work units.
 const UNITS_PER_ORDER: u64 = 4;
+/// Comparing a move with another one, in work units.
+const UNITS_PER_PAIR: usize = 4;
 /// How often in a row nothing may be left to try near the best order until that counts as all.
 const MOST_MISSES: u32 = 30;
 
@@ -118,7 +120,8 @@ impl Solver {
         order: &[Item],
         best: Time,
     ) -> Option<Source> {
-        self.weigh(hops, ORDERS_LOOKED_AT);
+        // Its moves are compared with each other anew.
+        self.weigh(hops, ORDERS_LOOKED_AT + UNITS_PER_PAIR * hops.list.len());
         let (hops, order) = vary(
             scene,
             &mut self.ground,

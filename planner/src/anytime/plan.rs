@@ -82,6 +82,8 @@ impl Plan {
                 if grip.is_release {
                     let down = grip.time - ground.release;
                     let resting = (owner, turns[grip.object]);
+                    // Who held it from the beginning has it where it stands then.
+                    self.timeline.vacate(class, cells, owner, down);
                     self.timeline.occupy(class, cells, resting, down);
                 } else {
                     let up = grip.time - ground.grasp;
