@@ -90,7 +90,8 @@ pub(crate) const METHODS: [&str; 5] = [
     "anytime",
 ];
 const MAX_UNITS: u64 = 1_000_000_000_000;
-const MAX_ROBOTS: i64 = shm_types::capacity::MAX_ROBOTS as i64;
+/// Most robots, as clap counts.
+pub(crate) const MAX_ROBOTS: i64 = shm_types::capacity::MAX_ROBOTS as i64;
 
 /// Ticks and clocks.
 #[derive(Debug, Args)]

@@ -2,17 +2,19 @@
 //! stopped; and in real time, whoever is stopped is held, alone.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod live;
+
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::process::Child;
+use std::time::Duration;
 
 use scene::builtin::BUILTIN;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// No run of these tests may take longer, whatever the machine does.
-const WATCHDOG: Duration = Duration::from_secs(240);
+use live::{binary, finish, wait_until};
+
 /// Wall time for which a process is stopped: far more than a tick, less than the 5 s after which
 /// a silent process counts as dead in real time.
 const STOPPED: Duration = Duration::from_millis(1_500);
@@ -34,31 +36,14 @@ impl Place {
     }
 
     fn start(&mut self, arguments: &[&str]) {
-        let child = Command::new(assert_cmd::cargo::cargo_bin!("rearrange"))
-            .arg("run")
-            .args(arguments)
-            .env("XDG_RUNTIME_DIR", self.dir.path())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        self.run = Some(child);
+        let child = binary(self.dir.path()).arg("run").args(arguments).spawn();
+        self.run = Some(child.unwrap());
     }
 
     /// The result of the run, which must end within the watchdog's time.
     fn finish(mut self) -> Finished {
-        let started = Instant::now();
-        let mut child = self.run.take().unwrap();
-        while child.try_wait().unwrap().is_none() {
-            if started.elapsed() > WATCHDOG {
-                child.kill().unwrap();
-                panic!("the run has hung: {:?}", child.wait_with_output());
-            }
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        let Output { stdout, stderr, .. } = child.wait_with_output().unwrap();
-        let result = serde_json::from_slice(&stdout)
-            .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&stderr)));
+        let (status, result, stderr) = finish(self.run.take().unwrap());
+        assert!(result.is_object(), "{status}: {stderr}");
         Finished {
             result,
             place: self,
@@ -67,20 +52,17 @@ impl Place {
 
     /// What the run says of itself, once all its processes are up.
     fn run_json(&self) -> Value {
-        let started = Instant::now();
-        while started.elapsed() < WATCHDOG {
+        let mut found = None;
+        wait_until("a run", || {
             let runs = fs::read_dir(self.file("rearrange")).into_iter().flatten();
-            for run in runs.flatten() {
-                let text = fs::read_to_string(run.path().join("run.json")).unwrap_or_default();
-                if let Ok(json) = serde_json::from_str::<Value>(&text)
-                    && json["processes"].as_array().is_some_and(|p| p.len() > 3)
-                {
-                    return json;
-                }
-            }
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        panic!("no run has come up");
+            let read = |run: fs::DirEntry| fs::read_to_string(run.path().join("run.json")).ok();
+            let texts = runs.flatten().filter_map(read);
+            let mut runs = texts.filter_map(|text| serde_json::from_str::<Value>(&text).ok());
+            let is_up = |run: &Value| run["processes"].as_array().is_some_and(|p| p.len() > 3);
+            found = runs.find(is_up);
+            found.is_some()
+        });
+        found.unwrap()
     }
 
     fn signal_robot(&self, robot: u64, signal: i32) {

@@ -6,11 +6,13 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod live;
+
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::process::Child;
+use std::time::Duration;
 
 use node::domain::RunFile;
 use node::options::{Delay, Role};
@@ -20,22 +22,14 @@ use serde_json::Value;
 use shm_types::Outcome;
 use tempfile::TempDir;
 
-/// No run of these tests may take longer, whatever the machine does.
-const WATCHDOG: Duration = Duration::from_secs(120);
+use live::{binary, finish, wait_until};
+
 /// A room where two robots are busy for half a minute of world time.
 const ROOM: &str = "e1";
 /// Makes a lockstep run of it last for as long as a test needs: 20 ms a tick.
 const SLOW: [&str; 2] = ["--delay", "world=20x100000"];
 /// A run in real time that lasts for as long as a test needs.
 const REAL: [&str; 6] = ["--clock", "real", "--rate", "100", "--speed", "0.1"];
-
-fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
-    let started = Instant::now();
-    while !done() {
-        assert!(started.elapsed() < WATCHDOG, "{what} never happened");
-        std::thread::sleep(Duration::from_millis(5));
-    }
-}
 
 fn signal(pid: u32, signal: i32) {
     let pid = i32::try_from(pid).unwrap();
@@ -69,13 +63,9 @@ impl Run {
     /// Starts a run that lasts, and waits until it has made its first ticks.
     fn start(arguments: &[&str]) -> Self {
         let place = tempfile::Builder::new().prefix("rr").tempdir().unwrap();
-        let child = Command::new(assert_cmd::cargo::cargo_bin!("rearrange"))
+        let child = binary(place.path())
             .args(["run", ROOM, "--json"])
             .args(arguments)
-            .env("XDG_RUNTIME_DIR", place.path())
-            .env_remove("RUST_LOG")
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
             .spawn()
             .unwrap();
         let mut found = None;
@@ -104,23 +94,7 @@ impl Run {
 
     /// Waits for the end; the status and the result.
     fn end(&mut self) -> (i32, Value, String) {
-        let mut child = self.child.take().unwrap();
-        let started = Instant::now();
-        while child.try_wait().unwrap().is_none() {
-            if started.elapsed() > WATCHDOG {
-                child.kill().unwrap();
-                panic!("the run has hung: {:?}", child.wait_with_output());
-            }
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        let Output {
-            status,
-            stdout,
-            stderr,
-        } = child.wait_with_output().unwrap();
-        let stderr = String::from_utf8(stderr).unwrap();
-        let result = serde_json::from_slice(&stdout).unwrap_or(Value::Null);
-        (status.code().unwrap(), result, stderr)
+        finish(self.child.take().unwrap())
     }
 
     /// Nothing of the run is left: no process, no file in shared memory, no directory.
@@ -296,25 +270,23 @@ fn in_real_time_a_robot_that_stays_silent_is_declared_gone_and_the_others_go_on(
 fn every_way_to_wait_reaches_the_same_state() {
     let hash = |arguments: &[&str]| {
         let place = tempfile::Builder::new().prefix("rr").tempdir().unwrap();
-        let run = assert_cmd::Command::new(assert_cmd::cargo::cargo_bin!("rearrange"))
+        let mut command = binary(place.path());
+        let child = command
             .args(["run", ROOM, "--json"])
             .args(arguments)
-            .env("XDG_RUNTIME_DIR", place.path())
-            .timeout(WATCHDOG)
-            .assert();
-        let output = run.get_output();
-        let result: Value = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
-        (output.status.code(), result["state_hash"].clone())
+            .spawn();
+        let (status, result, _) = finish(child.unwrap());
+        (status, result["state_hash"].clone())
     };
     let hybrid = hash(&["--wait", "hybrid"]);
-    assert_eq!(hybrid.0, Some(0));
+    assert_eq!(hybrid.0, 0);
     assert_eq!(hash(&["--wait", "block"]), hybrid);
     assert_eq!(hash(&["--wait", "block", "--realtime", "--pin"]), hybrid);
     let cores = std::thread::available_parallelism().unwrap().get();
     if cores < 5 {
         // World, planner, recorder and two robots would spin on fewer cores.
-        assert_eq!(hash(&["--wait", "spin"]).0, Some(2));
-        assert_eq!(hash(&["--wait", "hybrid", "--realtime"]).0, Some(2));
+        assert_eq!(hash(&["--wait", "spin"]).0, 2);
+        assert_eq!(hash(&["--wait", "hybrid", "--realtime"]).0, 2);
     } else {
         assert_eq!(hash(&["--wait", "spin"]), hybrid);
     }

@@ -5,10 +5,12 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod live;
+
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::path::PathBuf;
+use std::process::Child;
+use std::time::Duration;
 
 use node::Role;
 use node::domain::RunFile;
@@ -16,30 +18,12 @@ use node::supervisor::{DIARY_FILE, Entry, Happened};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// No run of these tests may take longer, whatever the machine does.
-const WATCHDOG: Duration = Duration::from_secs(120);
+use live::{binary, finish, wait_until};
+
 /// A room where two robots are busy for half a minute of world time.
 const ROOM: &str = "e1";
 /// Makes a lockstep run of it last for some seconds.
 const SLOW: [&str; 2] = ["--delay", "world=1"];
-
-fn binary(place: &Path) -> Command {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin!("rearrange"));
-    command
-        .env("XDG_RUNTIME_DIR", place)
-        .env_remove("RUST_LOG")
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    command
-}
-
-fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
-    let started = Instant::now();
-    while !done() {
-        assert!(started.elapsed() < WATCHDOG, "{what} never happened");
-        std::thread::sleep(Duration::from_millis(2));
-    }
-}
 
 fn kill(pid: u32, signal: i32) {
     // SAFETY: a signal to a process of a run of this test.
@@ -151,26 +135,6 @@ impl Drop for Run {
             }
         }
     }
-}
-
-/// Waits for the end; the status, the result, and what went to stderr.
-fn finish(mut child: Child) -> (i32, Value, String) {
-    let started = Instant::now();
-    while child.try_wait().unwrap().is_none() {
-        if started.elapsed() > WATCHDOG {
-            child.kill().unwrap();
-            panic!("the run has hung: {:?}", child.wait_with_output());
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let Output {
-        status,
-        stdout,
-        stderr,
-    } = child.wait_with_output().unwrap();
-    let result = serde_json::from_slice(&stdout).unwrap_or(Value::Null);
-    let stderr = String::from_utf8_lossy(&stderr).into_owned();
-    (status.code().unwrap_or(-1), result, stderr)
 }
 
 fn assert_solved(run: &mut Run) -> Value {

@@ -1,8 +1,16 @@
 //! The planner of schedules: a first plan, then better ones.
 //!
-//! Responsible for: first plans, going on from a part of one, which plan is the best so far.
-//! Not responsible for: what is tried to make it better (`improve`), committing (`plan`), what is
+//! Responsible for: first plans, carrying out an order, which plan is the best so far.
+//! Not responsible for: what is tried to make it better (`improve`), while robots follow it
+//! (`under_way`), plans out of joint configurations (`joint_plans`), committing (`plan`), what is
 //! published (`publish`).
+
+mod joint_plans;
+#[cfg(test)]
+pub(super) mod testing;
+#[cfg(test)]
+mod tests;
+mod under_way;
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashSet};
@@ -12,16 +20,15 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use scene::{ROBOT_ALONE, Scene, Settings};
-use shm_types::Verdict;
 
 use crate::anytime::ground::{EVER, Ground, Time};
-use crate::anytime::joint::{Found, Joint, JointMove};
+use crate::anytime::joint::Joint;
 use crate::anytime::known::Known;
 use crate::anytime::order::{Clocks, Hops, Item};
 use crate::anytime::plan::Plan;
 use crate::anytime::route::Router;
 use crate::anytime::sequence::{Sequencer, Step};
-use crate::anytime::shortest::{JointStep, Least, Shortest};
+use crate::anytime::shortest::Shortest;
 use crate::anytime::situation::Situation;
 use crate::anytime::track::{Move, Place, Start, Track};
 use crate::anytime::{
@@ -31,8 +38,6 @@ use crate::anytime::{
 /// Most distances that are kept: one for each lattice point and place that somebody goes to, 4
 /// bytes each.
 const MOST_DISTANCES: usize = 1 << 28;
-/// Configurations that the complete search looks at in one go.
-const CONFIGURATIONS_PER_SLICE: usize = 5_000;
 
 /// Moves, and an order of them.
 pub(super) type Source = (Rc<Hops>, Vec<Item>);
@@ -263,93 +268,6 @@ impl Solver {
         Some(self.keep(makespan, source))
     }
 
-    /// A first plan by the complete search, a slice of it: nothing while it goes on, then whether
-    /// there is a plan, or that there is none.
-    pub(crate) fn search(&mut self, scene: &Scene) -> Option<Result<Time, Verdict>> {
-        if self.is_short {
-            return Some(Err(Verdict::NotFound));
-        }
-        let mut joint = match self.joint.take() {
-            Some(joint) => joint,
-            None => {
-                let (start, homes) = (&self.start, &self.homes);
-                match Joint::new(scene, &mut self.ground, start, homes, &self.goals) {
-                    Some(joint) => Box::new(joint),
-                    None => return Some(Err(Verdict::NotFound)),
-                }
-            }
-        };
-        let found = joint.advance(&self.ground, CONFIGURATIONS_PER_SLICE);
-        self.configurations = joint.seen() as u64;
-        match found {
-            Found::Open => {
-                self.joint = Some(joint);
-                None
-            }
-            Found::TooMany => Some(Err(Verdict::NotFound)),
-            Found::Exhausted if self.is_start => Some(Err(Verdict::Exhausted)),
-            Found::Exhausted => Some(Err(Verdict::NotFound)),
-            Found::Plan(moves) => Some(Ok(self.adopt(scene, moves))),
-        }
-    }
-
-    /// Takes moves of single robots over: as a sequence that robots may carry out side by side, or
-    /// else as they are.
-    fn adopt(&mut self, scene: &Scene, moves: Vec<(usize, JointMove)>) -> Time {
-        let start = self.start.robots.iter().map(|track| track.free.0);
-        let mut cells: Vec<u32> = start.collect();
-        let mut sequence = Vec::new();
-        for &(robot, made) in &moves {
-            match made {
-                JointMove::Step(direction) => {
-                    let offset = self.ground.offsets[direction as usize];
-                    cells[robot] = cells[robot].wrapping_add_signed(offset);
-                }
-                JointMove::Grasp(_) => {}
-                JointMove::Release(object) => {
-                    let object = usize::from(object);
-                    let at = scene.lattice.at(cells[robot]) - scene.objects[object].grasp;
-                    sequence.push((object, Place::of(scene, &self.ground, object, at)));
-                }
-            }
-        }
-        if let Some(makespan) = self.begin_with(scene, &sequence) {
-            return makespan;
-        }
-        let steps = moves.into_iter().map(|made| vec![made]);
-        let steps: Vec<JointStep> = steps.collect();
-        self.plan.replay(scene, &self.ground, &self.start, &steps);
-        self.keep(self.plan.makespan(), None)
-    }
-
-    /// Looks for a plan with fewer steps than the best one, a slice of the search. False once it is
-    /// over, or if the room is none that it can be made for.
-    pub(crate) fn shorten(&mut self, scene: &Scene) -> bool {
-        let Some(best) = &self.best else { return false };
-        let shortest = self.shortest.take().or_else(|| {
-            let (ground, start, homes) = (&self.ground, &self.start, &self.homes);
-            let found = Shortest::new(scene, ground, start, homes, &self.goals, best.makespan);
-            found.map(Box::new)
-        });
-        let Some(mut shortest) = shortest else {
-            return false;
-        };
-        let found = shortest.advance(&self.ground, CONFIGURATIONS_PER_SLICE);
-        self.small_configurations = shortest.seen() as u64;
-        match found {
-            Least::Open => {
-                self.shortest = Some(shortest);
-                return true;
-            }
-            Least::NoneShorter | Least::TooMany => {}
-            Least::Plan(steps) => {
-                self.plan.replay(scene, &self.ground, &self.start, &steps);
-                self.keep(self.plan.makespan(), None);
-            }
-        }
-        false
-    }
-
     /// Keeps the plan as the best one.
     pub(super) fn keep(&mut self, makespan: Time, source: Option<Source>) -> Time {
         let tracks = self.plan.tracks().to_vec();
@@ -479,79 +397,4 @@ impl Solver {
         self.followed.get_or_insert_with(|| best.clone());
         Some(best.makespan)
     }
-
-    /// Keeps so many deeds of each robot of the plan that is followed, as `kept` says, and looks
-    /// for what comes after them anew. False if nothing comes after them.
-    pub(crate) fn go_on(
-        &mut self,
-        scene: &Scene,
-        kept: impl FnOnce(&[Track]) -> Vec<usize>,
-    ) -> bool {
-        let Some(followed) = self.followed.clone() else {
-            return false;
-        };
-        let Some((hops, followed_order)) = &followed.source else {
-            return false;
-        };
-        let kept = kept(&followed.tracks);
-        let turns =
-            |start: &Start| -> Vec<u32> { start.rests().iter().map(|rest| rest.turns).collect() };
-        let before = turns(&self.start);
-        self.start.robots = (followed.tracks.iter().zip(kept))
-            .map(|(track, kept)| track.cut(&self.ground, kept))
-            .collect();
-        // Of each object, the first moves are those kept.
-        let mut kept = turns(&self.start);
-        kept.iter_mut()
-            .zip(&before)
-            .for_each(|(kept, before)| *kept -= before);
-        let mut made = vec![0; kept.len()];
-        let mut order = Vec::new();
-        let mut sequence: Vec<Step> = Vec::new();
-        for &(object, robot) in followed_order {
-            let index = object as usize;
-            if made[index] >= kept[index] {
-                let hop = hops.of[index].0 + made[index] as usize;
-                order.push((object, robot));
-                sequence.push((index, Rc::clone(&hops.list[hop].to)));
-            }
-            made[index] += 1;
-        }
-        if order.is_empty() {
-            return false;
-        }
-        self.known.clear();
-        let (start, homes) = (&self.start, &self.homes);
-        let hops = Hops::new(scene, &mut self.ground, start, homes, &sequence);
-        self.current = Some((Rc::new(hops), order));
-        self.tried.clear();
-        self.misses = 0;
-        self.best = Some(Best {
-            source: self.current.clone(),
-            ..followed
-        });
-        self.followed.clone_from(&self.best);
-        true
-    }
-
-    /// Whether the best plan is better than the one that is followed.
-    pub(crate) fn has_better(&self) -> bool {
-        let makespan = |best: &Option<Best>| best.as_ref().map(|best| best.makespan);
-        makespan(&self.best) < makespan(&self.followed)
-    }
-
-    /// Robots follow the best plan from now on.
-    pub(crate) fn accept_better(&mut self) {
-        self.followed.clone_from(&self.best);
-    }
-
-    /// Robots go on as before.
-    pub(crate) fn drop_better(&mut self) {
-        self.best.clone_from(&self.followed);
-    }
 }
-
-#[cfg(test)]
-pub(super) mod testing;
-#[cfg(test)]
-mod tests;

@@ -97,12 +97,13 @@ impl Report {
         self.erred.append(&mut victim.erred);
         let result = victim.result();
         if let Some(words) = self.judge(&victim, &ended, result.as_ref()) {
-            self.failures
-                .push(format!("run {}: {words}", victim.number));
+            let number = victim.number;
+            let kept = victim.kept();
+            self.failures.push(format!("run {number}: {words}; {kept}"));
         } else {
             self.solved += 1;
+            victim.clean_up();
         }
-        victim.clean_up();
     }
 
     /// What is wrong with a run, if anything.

@@ -203,6 +203,12 @@ impl Victim {
         }
     }
 
+    /// Where what it said can be read.
+    pub(crate) fn kept(&self) -> String {
+        let (out, errors) = (self.out.display(), self.errors.display());
+        format!("its result and messages are in {out} and {errors}")
+    }
+
     /// Removes the files of this process; the run's own are none of ours.
     pub(crate) fn clean_up(&self) {
         let _ = fs::remove_file(&self.out);

@@ -3,7 +3,7 @@
 use super::testing::{planned, written};
 use super::*;
 use crate::anytime::keep::kept;
-use crate::anytime::plan::enter;
+use crate::anytime::plan::lay::enter;
 use crate::anytime::route::sides;
 use crate::anytime::timeline::Timeline;
 use crate::anytime::track::{Deed, grips_in_turn};
