@@ -6,6 +6,7 @@
 
 use shm_types::{Activity, Checked, Phase, PlannerReport};
 
+use crate::invariants::Checks;
 use crate::state::Robot;
 
 /// Ticks of one robot by what it did in them.
@@ -59,6 +60,8 @@ pub struct WorldCounters {
     pub schedules_refused: u64,
     /// Exact swept tests of two shapes.
     pub swept_tests: u64,
+    /// How often the invariants were checked.
+    pub checks: Checks,
 }
 
 /// What `robot` did in a tick: a body that moved was moving whatever its robot says, and one that

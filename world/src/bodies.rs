@@ -68,10 +68,10 @@ impl Bodies {
     /// The same count of tests, with a version of the scene and its objects at these places; none
     /// for one that is held.
     pub(crate) fn of_version(&self, scene: &Scene, place: impl Fn(usize) -> Option<Vec2>) -> Self {
-        Self {
-            tests: self.tests.clone(),
-            ..Self::with(scene, place)
-        }
+        let mut bodies = Self::with(scene, place);
+        bodies.tests = self.tests.clone();
+        bodies.ground.comes_after(&self.ground);
+        bodies
     }
 
     fn with(scene: &Scene, place: impl Fn(usize) -> Option<Vec2>) -> Self {
@@ -110,6 +110,18 @@ impl Bodies {
     pub(crate) fn region(&self, sweep: Sweep, clearance: bool) -> Aabb {
         let (bare, grown) = self.boxes[sweep.class.0];
         Aabb::around(sweep.from, sweep.to).swept_by(if clearance { grown } else { bare })
+    }
+
+    /// Box that a body covers from `start` along `places`.
+    pub(crate) fn region_along(
+        &self,
+        class: ClassId,
+        start: Vec2,
+        places: impl Iterator<Item = Vec2>,
+    ) -> Aabb {
+        let here = Aabb::around(start, start);
+        let all = places.fold(here, |all, place| all.joined(Aabb::around(place, place)));
+        all.swept_by(self.boxes[class.0].0)
     }
 
     /// Whether a sweep meets a wall.

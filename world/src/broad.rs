@@ -21,6 +21,7 @@ pub(crate) struct Ground {
     boxes: Vec<Aabb>,
     /// How far any object reaches from its centre.
     reach: Aabb,
+    put_downs: u64,
 }
 
 impl Ground {
@@ -34,6 +35,7 @@ impl Ground {
             near: Near::new(scene, boxes.len(), cell_m),
             boxes,
             reach,
+            put_downs: 0,
         };
         for object in 0..scene.objects.len() {
             if let Some(at) = place(object) {
@@ -46,6 +48,17 @@ impl Ground {
     /// Puts `object`, which is not on the ground, down at `at`.
     pub(crate) fn put(&mut self, object: usize, at: Vec2) {
         self.near.put(object, at);
+        self.put_downs += 1;
+    }
+
+    /// Another number whenever something has come to lie somewhere.
+    pub(crate) const fn put_downs(&self) -> u64 {
+        self.put_downs
+    }
+
+    /// Counts on from where `before`, the ground of another version of the scene, stopped.
+    pub(crate) const fn comes_after(&mut self, before: &Self) {
+        self.put_downs += before.put_downs + 1;
     }
 
     /// Takes `object` off the ground.

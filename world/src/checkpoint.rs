@@ -17,7 +17,7 @@ use shm_types::{
 use crate::accounts::{ActivityTimes, WorldCounters};
 use crate::epoch::Epoch;
 use crate::guards::{Guard, Guards};
-use crate::invariants::Violation;
+use crate::invariants::{Checks, Violation};
 use crate::path::Path;
 use crate::saved::{Reader, Saved, Unreadable, save_bytes, saved, saved_as_bytes, saved_as_code};
 use crate::schedules::{Refused, Schedules};
@@ -27,7 +27,7 @@ use crate::step::World;
 use crate::track::Track;
 
 /// Form of the bytes. Raised whenever it changes.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// First bytes of each.
 const MAGIC: [u8; 4] = *b"rrck";
 /// Bytes of the checksum at the end.
@@ -151,6 +151,12 @@ saved!(WorldCounters {
     grips_refused,
     violations,
     schedules_refused,
+    swept_tests,
+    checks,
+});
+saved!(Checks {
+    made,
+    anew,
     swept_tests,
 });
 
@@ -317,7 +323,7 @@ impl World {
             outcome,
             violation,
             counters,
-            regions: _,
+            cleared: _,
             wire,
         } = self;
         let header = &wire.header;

@@ -240,17 +240,9 @@ fn set_out(robot: &Robot, tick: u64, tick_m: f64) -> Track {
 
 /// Box of what a robot covers from where it stands along its whole grant.
 fn region_of(around: Surroundings<'_>, robot: &Robot) -> Aabb {
-    let class = robot.class(around.scene);
-    let standing = around
-        .bodies
-        .region(Sweep::standing(class, robot.position), false);
-    robot
-        .grant
-        .points()
-        .iter()
-        .fold(standing, |region, &point| {
-            region.joined(around.bodies.region(Sweep::standing(class, point), false))
-        })
+    let (class, points) = (robot.class(around.scene), robot.grant.points());
+    let bodies = around.bodies;
+    bodies.region_along(class, robot.position, points.iter().copied())
 }
 
 #[cfg(test)]

@@ -2,19 +2,85 @@
 //!
 //! Responsible for: no two bodies overlap, swept over the tick; each object is held by at most
 //! one robot, and both sides agree; objects are neither lost nor doubled; robots move only on
-//! grants and no faster than they can; what stays granted is disjoint. Epochs and ticks only ever
-//! count up, by construction. Not responsible for: what a broken one means (`step.rs` ends the
-//! run). A second, independent check is the trace checker's.
+//! grants and no faster than they can; what stays granted is disjoint; how often each was checked.
+//! Epochs and ticks only ever count up, by construction. Not responsible for: what a broken one
+//! means (`step.rs` ends the run), what need not be looked at again (`cleared.rs`). A second,
+//! independent check is the trace checker's.
+//!
+//! Two robots of which neither has left the ways that were found disjoint cannot have met, so only
+//! what has changed is held against everything around it.
 
 use scene::{Scene, Vec2};
 use shm_types::{EventKind, TaskStatus};
 
 use crate::bodies::Sweep;
-use crate::broad::Aabb;
+use crate::cleared::{Change, Cleared};
 use crate::journal::Event;
 use crate::path::ARRIVAL_M;
 use crate::state::{Object, Robot, id, is_at};
 use crate::step::World;
+
+/// What is checked, by what would be found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Invariant {
+    /// [`Violation::Robots`], for each pair of robots.
+    Robots,
+    /// [`Violation::Object`], for each robot.
+    Object,
+    /// [`Violation::Wall`], for each robot.
+    Wall,
+    /// [`Violation::Holding`], for each robot that holds something.
+    Holding,
+    /// [`Violation::Lost`], for each object.
+    Lost,
+    /// [`Violation::Motion`], for each robot.
+    Motion,
+    /// [`Violation::Grants`], for each pair of robots.
+    Grants,
+}
+
+impl Invariant {
+    /// Every one, in the order of [`Violation::code`].
+    pub const ALL: [Self; 7] = [
+        Self::Robots,
+        Self::Object,
+        Self::Wall,
+        Self::Holding,
+        Self::Lost,
+        Self::Motion,
+        Self::Grants,
+    ];
+}
+
+/// How often each invariant was checked.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Checks {
+    pub(crate) made: [u64; Invariant::ALL.len()],
+    pub(crate) anew: [u64; Invariant::ALL.len()],
+    /// Exact swept tests that took.
+    pub swept_tests: u64,
+}
+
+impl Checks {
+    /// For how many bodies, pairs or objects, summed over the ticks, `invariant` was found to hold
+    /// or not.
+    #[must_use]
+    pub const fn made(&self, invariant: Invariant) -> u64 {
+        self.made[invariant as usize]
+    }
+
+    /// For how many of these something that it depends on had changed, so that it was looked at
+    /// anew; for the others it was seen that nothing had.
+    #[must_use]
+    pub const fn anew(&self, invariant: Invariant) -> u64 {
+        self.anew[invariant as usize]
+    }
+
+    const fn add(&mut self, invariant: Invariant, made: u64, anew: u64) {
+        self.made[invariant as usize] += made;
+        self.anew[invariant as usize] += anew;
+    }
+}
 
 /// An invariant found broken. The numbers travel in the `Violated` event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,18 +131,24 @@ pub enum Violation {
 }
 
 impl Violation {
-    /// Its number in the `Violated` event.
+    /// What it is a violation of.
+    #[must_use]
+    pub const fn invariant(self) -> Invariant {
+        match self {
+            Self::Robots { .. } => Invariant::Robots,
+            Self::Object { .. } => Invariant::Object,
+            Self::Wall { .. } => Invariant::Wall,
+            Self::Holding { .. } => Invariant::Holding,
+            Self::Lost { .. } => Invariant::Lost,
+            Self::Motion { .. } => Invariant::Motion,
+            Self::Grants { .. } => Invariant::Grants,
+        }
+    }
+
+    /// Its number in the `Violated` event, from 1.
     #[must_use]
     pub const fn code(self) -> u64 {
-        match self {
-            Self::Robots { .. } => 1,
-            Self::Object { .. } => 2,
-            Self::Wall { .. } => 3,
-            Self::Holding { .. } => 4,
-            Self::Lost { .. } => 5,
-            Self::Motion { .. } => 6,
-            Self::Grants { .. } => 7,
-        }
+        self.invariant() as u64 + 1
     }
 
     /// The event that tells of it.
@@ -101,32 +173,64 @@ impl Violation {
 impl World {
     /// The first invariant broken in the tick that has just been moved, if any.
     pub(crate) fn find_violation(&mut self, scene: &Scene) -> Option<Violation> {
-        for (i, robot) in self.robots.iter().enumerate() {
-            let class = robot.class(scene);
-            let mut region = self
-                .bodies
-                .region(Sweep::standing(class, robot.track.end()), false);
-            for &(_, at) in robot.track.corners() {
-                region = region.joined(self.bodies.region(Sweep::standing(class, at), false));
-            }
-            self.regions[i] = region;
+        let before = self.bodies.tests();
+        let mut cleared = std::mem::take(&mut self.cleared);
+        for (robot, cleared) in self.robots.iter().zip(&mut cleared) {
+            cleared.compare(scene, &self.bodies, robot);
         }
-        (0..self.robots.len())
-            .find_map(|i| {
-                self.check_motion(i)
-                    .or_else(|| self.check_hand(scene, i))
-                    .or_else(|| self.check_surroundings(scene, i))
-                    .or_else(|| self.check_others(scene, i))
-            })
-            .or_else(|| self.check_objects())
+        self.count_checks(&cleared);
+        let found = (0..self.robots.len())
+            .find_map(|i| self.check_robot(scene, i, &mut cleared))
+            .or_else(|| self.check_objects());
+        self.cleared = cleared;
+        self.counters.checks.swept_tests += self.bodies.tests() - before;
+        found
     }
 
-    fn check_motion(&self, i: usize) -> Option<Violation> {
+    /// Robot `i` by itself, and what has changed of it against everything around.
+    fn check_robot(&self, scene: &Scene, i: usize, cleared: &mut [Cleared]) -> Option<Violation> {
+        let change = cleared[i].change();
+        let found = self
+            .check_motion(i, change.is_none())
+            .or_else(|| self.check_hand(scene, i));
+        let Some(change) = change else {
+            return found;
+        };
+        let found = found
+            .or_else(|| self.check_surroundings(scene, i, change))
+            .or_else(|| self.check_others(scene, i, change, cleared));
+        if found.is_none() {
+            let clear = self.clear_ahead(scene, i, change);
+            cleared[i].accept(&self.robots[i], clear);
+        }
+        found
+    }
+
+    fn count_checks(&mut self, cleared: &[Cleared]) {
+        let (robots, objects) = (self.robots.len() as u64, self.objects.len() as u64);
+        let changed = cleared.iter().filter(|c| c.change().is_some()).count() as u64;
+        let holding = self.robots.iter().filter(|r| r.hand.holding().is_some());
+        let holding = holding.count() as u64;
+        // Those that changed, with each other and with all others.
+        let changed_pairs = changed * (2 * robots - changed).saturating_sub(1) / 2;
+        let pairs = robots * robots.saturating_sub(1) / 2;
+        let checks = &mut self.counters.checks;
+        checks.add(Invariant::Robots, pairs, changed_pairs);
+        checks.add(Invariant::Object, robots, changed);
+        checks.add(Invariant::Wall, robots, changed);
+        checks.add(Invariant::Holding, holding, holding);
+        checks.add(Invariant::Lost, objects, objects);
+        checks.add(Invariant::Motion, robots, robots);
+        checks.add(Invariant::Grants, pairs, changed_pairs);
+    }
+
+    /// A robot that `followed` its way has gone along it to where what is left of it begins, and
+    /// has no other path granted: there is nothing to measure.
+    fn check_motion(&self, i: usize, followed: bool) -> Option<Violation> {
         let robot = &self.robots[i];
         let moved_m = robot.track.moved_m();
-        let length_m = robot.grant.length_from(robot.position);
-        let used_m = robot.granted_m - length_m;
-        let on_grant = !robot.moved || (used_m - moved_m).abs() <= 8.0 * ARRIVAL_M;
+        let used_m = || robot.granted_m - robot.grant.length_from(robot.position);
+        let on_grant = !robot.moved || followed || (used_m() - moved_m).abs() <= 8.0 * ARRIVAL_M;
         let on_track = robot.position == robot.track.end();
         let in_time = moved_m <= self.tick_m + ARRIVAL_M;
         (!on_grant || !on_track || !in_time).then_some(Violation::Motion { robot: id(i) })
@@ -147,82 +251,91 @@ impl World {
         })
     }
 
-    fn check_surroundings(&self, scene: &Scene, i: usize) -> Option<Violation> {
+    /// Where robot `i` was during the tick, unless that was found clear before.
+    fn check_surroundings(&self, scene: &Scene, i: usize, change: Change) -> Option<Violation> {
+        if !change.strayed {
+            return None;
+        }
         let robot = &self.robots[i];
         let class = robot.class(scene);
-        let mut at = robot.track.corners()[0].1;
-        for &(_, to) in robot.track.corners() {
-            let sweep = Sweep {
-                class,
-                from: at,
-                to,
+        if robot.track.corners().len() == 1 {
+            return self.obstacle(scene, i, Sweep::standing(class, robot.track.end()));
+        }
+        let mut pieces = robot.track.pieces();
+        pieces.find_map(|((_, from), (_, to))| self.obstacle(scene, i, Sweep { class, from, to }))
+    }
+
+    /// What robot `i` would overlap on a sweep: a wall or a grounded object.
+    fn obstacle(&self, scene: &Scene, i: usize, sweep: Sweep) -> Option<Violation> {
+        if self.bodies.meets_wall(scene, sweep, false) {
+            return Some(Violation::Wall { robot: id(i) });
+        }
+        let robot = &self.robots[i];
+        let waiver = |object| self.bodies.waiver(scene, robot, object);
+        let met = self.bodies.object_met(scene, sweep, false, waiver);
+        met.map(|object| Violation::Object {
+            robot: id(i),
+            object: id(object),
+        })
+    }
+
+    /// How many points of robot `i`'s grant it can go on to without overlapping anything that
+    /// stands: from there on its motion is looked at tick by tick.
+    fn clear_ahead(&self, scene: &Scene, i: usize, change: Change) -> usize {
+        let robot = &self.robots[i];
+        let ahead = robot.grant.points().len() - change.new_from;
+        let pieces = pieces(scene, robot).skip(change.new_from).take(ahead);
+        let clear = pieces.take_while(|piece| self.obstacle(scene, i, *piece).is_none());
+        change.new_from + clear.count()
+    }
+
+    /// What has changed of robot `i` against every other: bodies during the tick, granted path
+    /// after it.
+    fn check_others(
+        &self,
+        scene: &Scene,
+        i: usize,
+        change: Change,
+        cleared: &[Cleared],
+    ) -> Option<Violation> {
+        let robot = &self.robots[i];
+        let class = robot.class(scene);
+        let region = cleared[i].region();
+        for (j, other) in self.robots.iter().enumerate() {
+            if j == i || !region.meets(&cleared[j].region()) {
+                continue;
+            }
+            let (first, second) = (id(i.min(j)), id(i.max(j)));
+            let tracks_meet = || {
+                let other = (other.class(scene), &other.track);
+                let (track, span) = ((class, &robot.track), (0.0, self.tick_m));
+                self.bodies.tracks_meet(scene, track, false, other, span)
             };
-            at = to;
-            if self.bodies.meets_wall(scene, sweep, false) {
-                return Some(Violation::Wall { robot: id(i) });
-            }
-            let waiver = |object| self.bodies.waiver(scene, robot, object);
-            if let Some(object) = self.bodies.object_met(scene, sweep, false, waiver) {
-                return Some(Violation::Object {
-                    robot: id(i),
-                    object: id(object),
-                });
-            }
-        }
-        None
-    }
-
-    /// Robot `i` against those after it: bodies during the tick, granted path after it.
-    fn check_others(&self, scene: &Scene, i: usize) -> Option<Violation> {
-        let robot = &self.robots[i];
-        let class = robot.class(scene);
-        for j in i + 1..self.robots.len() {
-            let other = &self.robots[j];
-            let other_class = other.class(scene);
-            let near = self.regions[i].meets(&self.regions[j]);
-            let span = (0.0, self.tick_m);
-            if near
-                && self.bodies.tracks_meet(
-                    scene,
-                    (class, &robot.track),
-                    false,
-                    (other_class, &other.track),
-                    span,
-                )
-            {
+            if change.strayed && tracks_meet() {
                 return Some(Violation::Robots {
-                    robot: id(i),
-                    other: id(j),
+                    robot: first,
+                    other: second,
                 });
             }
-            if self.grants_meet(scene, robot, other) {
+            if self.grants_meet(scene, robot, change.new_from, other) {
                 return Some(Violation::Grants {
-                    robot: id(i),
-                    other: id(j),
+                    robot: first,
+                    other: second,
                 });
             }
         }
         None
     }
 
-    fn grants_meet(&self, scene: &Scene, robot: &Robot, other: &Robot) -> bool {
+    /// Whether what is granted to `robot` from its piece `new_from` on meets what is granted to
+    /// `other`.
+    fn grants_meet(&self, scene: &Scene, robot: &Robot, new_from: usize, other: &Robot) -> bool {
         if robot.grant.is_empty() && other.grant.is_empty() {
             return false;
         }
-        let region = |r: &Robot| {
-            let class = r.class(scene);
-            let here = self
-                .bodies
-                .region(Sweep::standing(class, r.position), false);
-            r.grant.points().iter().fold(here, |all: Aabb, &at| {
-                all.joined(self.bodies.region(Sweep::standing(class, at), false))
-            })
-        };
-        region(robot).meets(&region(other))
-            && pieces(scene, robot).any(|piece| {
-                pieces(scene, other)
-                    .any(|other| self.bodies.sweeps_meet(scene, piece, false, other))
-            })
+        pieces(scene, robot).skip(new_from).any(|piece| {
+            pieces(scene, other).any(|other| self.bodies.sweeps_meet(scene, piece, false, other))
+        })
     }
 
     fn check_objects(&self) -> Option<Violation> {
@@ -367,10 +480,27 @@ mod tests {
     #[test]
     fn motion_off_the_grant_or_too_fast_is_found() {
         let mut bench = bench();
+        bench.world.cleared[1] = Cleared::nothing();
         bench.world.robots[1].granted_m += 1e-3;
         assert_eq!(found(&mut bench), Some(Violation::Motion { robot: 1 }));
         bench.world.robots[1].granted_m -= 1e-3;
         assert_eq!(found(&mut bench), None);
+        bench.step();
+        let at = bench.world.robots[1].position;
+        let mut path = Path::EMPTY;
+        path.push(at + Vec2::new(0.003, 0.001));
+        bench.world.robots[1].track = Track::walk(at, &path, 9.0);
+        bench.world.robots[1].position = bench.world.robots[1].track.end();
+        bench.world.robots[1].granted_m = bench.world.robots[1].grant.length_from(at);
+        let motion = Violation::Motion { robot: 1 };
+        assert_eq!(found(&mut bench), Some(motion), "beside its way");
+        bench.world.robots[1].position = at;
+        bench.world.robots[1].track = Track::still(at);
+        bench.world.robots[1].moved = false;
+        assert_eq!(found(&mut bench), None);
+        bench.world.robots[1].moved = true;
+        bench.world.robots[1].track = Track::walk(at, &bench.world.robots[1].grant, 0.005);
+        bench.world.robots[1].position = bench.world.robots[1].track.end();
         bench.world.tick_m = 0.004;
         assert_eq!(found(&mut bench), Some(Violation::Motion { robot: 1 }));
     }
@@ -381,6 +511,51 @@ mod tests {
         bench.world.robots[0].grant.push(Vec2::new(6.0, 1.0));
         let violation = Violation::Grants { robot: 0, other: 1 };
         assert_eq!(found(&mut bench), Some(violation));
+    }
+
+    #[test]
+    fn path_that_was_given_back_and_taken_again_is_looked_at_again() {
+        let mut bench = bench();
+        let ahead = bench.world.robots[1].grant;
+        let at = bench.world.robots[1].position;
+        put(&mut bench, 1, at.x, at.y);
+        bench.world.robots[1].grant = ahead;
+        assert_eq!(found(&mut bench), None);
+        bench.world.robots[1].grant.clear();
+        assert_eq!(found(&mut bench), None);
+        // Robot 0 is granted a place on it meanwhile, and has it to itself.
+        let at = bench.world.robots[0].position;
+        bench.world.robots[0].grant.push(Vec2::new(at.x, 3.0));
+        bench.world.robots[0].grant.push(Vec2::new(6.0, 3.0));
+        bench.world.robots[0].grant.push(Vec2::new(6.0, 1.0));
+        assert_eq!(found(&mut bench), None);
+        bench.world.robots[1].grant = ahead;
+        let violation = Violation::Grants { robot: 0, other: 1 };
+        assert_eq!(found(&mut bench), Some(violation));
+    }
+
+    #[test]
+    fn what_has_not_changed_is_not_looked_at_again() {
+        let mut bench = bench();
+        bench.steps(3);
+        let anew = |bench: &Bench| bench.world.counters().checks.anew(Invariant::Robots);
+        let (made, before) = (bench.world.counters().checks, anew(&bench));
+        bench.steps(10);
+        let checks = bench.world.counters().checks;
+        assert_eq!(anew(&bench), before, "one holds, one goes straight on");
+        for (invariant, count) in [
+            (Invariant::Robots, 10),
+            (Invariant::Wall, 20),
+            (Invariant::Motion, 20),
+            (Invariant::Holding, 10),
+            (Invariant::Lost, 20),
+        ] {
+            let more = checks.made(invariant) - made.made(invariant);
+            assert_eq!(more, count, "{invariant:?}");
+        }
+        bench.ask(0, &[[1.0, 2.0]]);
+        bench.step();
+        assert_eq!(anew(&bench), before + 1);
     }
 
     #[test]

@@ -8,7 +8,10 @@ use shm_types::{
     Point, index,
 };
 
+use crate::cleared::Cleared;
+use crate::path::Path;
 use crate::testing::{Bench, TICK_M};
+use crate::track::Track;
 
 /// One thing that changes between two ticks.
 #[derive(Clone, Debug)]
@@ -360,6 +363,10 @@ proptest! {
         prop_assert_eq!(one.header().state_hash, other.header().state_hash);
         let (mut one, mut other) = (*one.world.counters(), *other.world.counters());
         (one.swept_tests, other.swept_tests) = (0, 0);
+        for checks in [&mut one.checks, &mut other.checks] {
+            // A world that was restored has looked at nothing yet.
+            (checks.anew, checks.swept_tests) = (Default::default(), 0);
+        }
         prop_assert_eq!(one, other);
     }
 }
@@ -379,4 +386,113 @@ fn random_commands_grasp_and_move_objects() {
         grasped += run(false, false, &acts.current()).unwrap().1;
     }
     assert!(grasped >= 10, "only {grasped} grasps in 30 runs");
+}
+
+/// Something that goes wrong between two looks, or not.
+#[derive(Clone, Debug)]
+enum Harm {
+    /// A robot is elsewhere.
+    Jump(usize, [f64; 2]),
+    /// It goes on along its grant.
+    Walk(usize, f64),
+    /// It is granted a straight piece more.
+    Grant(usize, [f64; 2]),
+    /// Its grant is taken back, and given to it again.
+    TakeBack(usize),
+    GiveAgain(usize),
+    /// It forgets its task.
+    Forget(usize),
+    /// An object comes to lie elsewhere.
+    PutDown(usize, [f64; 2]),
+}
+
+fn harm() -> impl Strategy<Value = Harm> {
+    let robot = 0..ROBOTS;
+    let little = || [-0.1..0.1, -0.1..0.1];
+    prop_oneof![
+        2 => (robot.clone(), little()).prop_map(|(i, by)| Harm::Jump(i, by)),
+        6 => (robot.clone(), 0.0..0.3).prop_map(|(i, by)| Harm::Walk(i, by)),
+        6 => (robot.clone(), [-0.6..0.6, -0.6..0.6]).prop_map(|(i, by)| Harm::Grant(i, by)),
+        2 => robot.clone().prop_map(Harm::TakeBack),
+        2 => robot.clone().prop_map(Harm::GiveAgain),
+        1 => robot.prop_map(Harm::Forget),
+        1 => (0..OBJECTS, little()).prop_map(|(o, by)| Harm::PutDown(o, by)),
+    ]
+}
+
+fn inflict(bench: &mut Bench, harm: &Harm, taken: &mut [Path; ROBOTS]) {
+    let world = &mut bench.world;
+    let by = |[x, y]: &[f64; 2]| Vec2::new(*x, *y);
+    for robot in &mut world.robots {
+        robot.track = Track::still(robot.position);
+        (robot.moved, robot.granted_m) = (false, 0.0);
+    }
+    match harm {
+        Harm::Jump(i, step) => {
+            let robot = &mut world.robots[*i];
+            robot.position += by(step);
+            robot.track = Track::still(robot.position);
+        }
+        Harm::Walk(i, length_m) => {
+            let robot = &mut world.robots[*i];
+            world.tick_m = 1.0;
+            robot.granted_m = robot.grant.length_from(robot.position);
+            robot.track = Track::walk(robot.position, &robot.grant, *length_m);
+            robot.moved = robot.track.corners().len() > 1;
+            robot.grant.drop_front(robot.track.used());
+            robot.position = robot.track.end();
+        }
+        Harm::Grant(i, step) => {
+            let robot = &mut world.robots[*i];
+            let end = robot.grant_end() + by(step);
+            robot.grant.push(end);
+        }
+        Harm::TakeBack(i) => {
+            taken[*i] = world.robots[*i].grant;
+            world.robots[*i].grant.clear();
+        }
+        Harm::GiveAgain(i) => world.robots[*i].grant = taken[*i],
+        Harm::Forget(i) => world.robots[*i].claim = None,
+        Harm::PutDown(object, step) => {
+            let ground = &mut world.bodies.ground;
+            if let Some(at) = ground.place(*object) {
+                ground.take(*object);
+                ground.put(*object, at + by(step));
+                world.objects[*object].position = at + by(step);
+                world.objects[*object].rest = at + by(step);
+            }
+        }
+    }
+    for i in 0..ROBOTS {
+        if let Some(object) = world.robots[i].hand.object() {
+            let at = world.robots[i].place_of(&bench.scene, object);
+            world.objects[object].position = at;
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(256))]
+
+    /// Looking only at what has changed finds as much as looking at everything.
+    #[test]
+    fn what_was_looked_at_before_hides_nothing(
+        acts in proptest::collection::vec(act(), 1..30),
+        harms in proptest::collection::vec(harm(), 1..60),
+    ) {
+        let (mut bench, _) = run(false, false, &acts)?;
+        let mut taken = [Path::EMPTY; ROBOTS];
+        for harm in harms {
+            inflict(&mut bench, &harm, &mut taken);
+            let found = bench.world.find_violation(&bench.scene);
+            let kept = bench.world.cleared.clone();
+            bench.world.cleared.fill(Cleared::nothing());
+            let anew = bench.world.find_violation(&bench.scene);
+            bench.world.cleared = kept;
+            prop_assert_eq!(found.is_some(), anew.is_some(), "{:?}: {:?}, {:?}", harm, found, anew);
+            if found.is_some() {
+                break;
+            }
+        }
+    }
 }

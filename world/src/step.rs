@@ -12,8 +12,8 @@ use shm_types::{
 use crate::accounts::{self, ActivityTimes, WorldCounters};
 use crate::bars::Bars;
 use crate::bodies::Bodies;
-use crate::broad::Aabb;
 use crate::change::Next;
+use crate::cleared::Cleared;
 use crate::constraints::Constraints;
 use crate::epoch::Epoch;
 use crate::grants::{Grants, Surroundings};
@@ -75,8 +75,8 @@ pub struct World {
     pub(crate) outcome: Outcome,
     pub(crate) violation: Option<Violation>,
     pub(crate) counters: WorldCounters,
-    /// Boxes of the robots' motion in a tick: working memory of the invariants.
-    pub(crate) regions: Vec<Aabb>,
+    /// What the invariants have looked at, by robot.
+    pub(crate) cleared: Vec<Cleared>,
     /// The snapshot as it will be published.
     pub(crate) wire: Box<WorldSnapshot>,
 }
@@ -121,7 +121,7 @@ impl World {
             outcome: Outcome::Running,
             violation: None,
             counters: WorldCounters::default(),
-            regions: vec![Aabb::around(scene::Vec2::zeros(), scene::Vec2::zeros()); robots.len()],
+            cleared: vec![Cleared::nothing(); robots.len()],
             settings,
             robots,
             objects,
