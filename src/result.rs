@@ -9,7 +9,7 @@
 use std::collections::BTreeMap;
 
 use bench::machine::Machine;
-use node::report::{ActivityReport, WorkReport};
+use node::report::{ActivityReport, InvariantsReport, WorkReport};
 use node::{LatencySummary, RoleReport, RunOptions};
 use serde::Serialize;
 
@@ -59,6 +59,8 @@ pub(crate) struct RunResult {
     pub(crate) times: Option<Times>,
     pub(crate) counts: Counts,
     pub(crate) checker: Option<Checker>,
+    /// What the world itself checked in every tick; nothing if no run took place.
+    pub(crate) invariants: Option<InvariantsReport>,
     pub(crate) latency: BTreeMap<&'static str, LatencySummary>,
     pub(crate) roles: Vec<RoleLine>,
     pub(crate) ticks: u64,
@@ -67,7 +69,8 @@ pub(crate) struct RunResult {
     pub(crate) wall_s: f64,
     /// More processes than cores: latencies then measure the scheduler as well.
     pub(crate) oversubscribed: bool,
-    /// Where the trace was kept.
+    /// Where the trace was kept: where it was asked for, or, of a run in which an invariant is
+    /// broken, in the directory for temporary files.
     pub(crate) trace: Option<String>,
     /// Things the user should know, such as a priority that was not permitted.
     pub(crate) notes: Vec<String>,

@@ -132,6 +132,16 @@ fn rows(result: &RunResult) -> Vec<(&'static str, String)> {
         rows.push(("checker", line));
         rows.extend(checker.first.iter().map(|text| ("violation", text.clone())));
     }
+    if let Some(invariants) = &result.invariants {
+        let total = invariants.total();
+        let line = format!(
+            "{} checked, {} of them anew, {} broken",
+            count(total.checks, "time"),
+            total.anew,
+            total.violations
+        );
+        rows.push(("invariants", line));
+    }
     if result.wall_s > 0.0
         && let Some(makespan) = result.makespan_s
     {

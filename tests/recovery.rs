@@ -241,6 +241,65 @@ fn a_run_whose_supervisor_dies_is_listed_and_resumed_to_its_end() {
     assert_solved(&mut run);
 }
 
+/// Puts robot 0 into a wall, in both states that the journal of a dead run holds, with checksums that
+/// fit: what a fault of the world itself would leave.
+fn put_robot_into_wall(run: &Run) {
+    /// Where the first robot's place is after the first word of a state.
+    const PLACE: usize = 68;
+    let path = run.directory.join("journal");
+    let mut journal = fs::read(&path).unwrap();
+    let starts: Vec<usize> = (16..journal.len() - 4)
+        .filter(|at| &journal[*at..at + 4] == b"rrck")
+        .collect();
+    assert_eq!(starts.len(), 2, "one in each slot");
+    for at in starts {
+        let length = u64::from_le_bytes(journal[at - 8..at].try_into().unwrap()) as usize;
+        let (state, sum) = journal[at..at + length].split_at_mut(length - 8);
+        let place = PLACE..PLACE + 16;
+        for coordinate in state[place.clone()].chunks(8) {
+            let metres = f64::from_le_bytes(coordinate.try_into().unwrap());
+            assert!((0.1..20.0).contains(&metres), "{metres} is no place");
+        }
+        // The corner of the room.
+        state[place].fill(0);
+        let mut hash = shm_types::StateHash::new();
+        hash.add(&*state);
+        sum.copy_from_slice(&hash.finish().to_le_bytes());
+    }
+    fs::write(&path, journal).unwrap();
+}
+
+#[test]
+fn a_broken_invariant_stops_the_run_and_keeps_its_trace() {
+    let mut run = Run::start(&SLOW);
+    run.kill_supervisor();
+    wait_until("the end of its processes", || {
+        run.say(&["list"]).1.contains("can be resumed")
+    });
+    put_robot_into_wall(&run);
+    let resume = binary(run.place.path())
+        .args(["resume", "--json"])
+        .env("TMPDIR", run.place.path())
+        .spawn();
+    run.child = Some(resume.unwrap());
+    let (status, result, stderr) = run.end();
+    assert_eq!(status, 6, "{result} {stderr}");
+    assert_eq!(result["outcome"], "failed");
+    assert_eq!(result["reason"], "Wall { robot: 0 }");
+    assert_eq!(result["invariants"]["wall"]["violations"], 1);
+    assert_eq!(result["invariants"]["robots"]["violations"], 0);
+    run.assert_nothing_left();
+    // What led there is in the trace, which nobody has asked for.
+    let kept = result["trace"].as_str().unwrap();
+    assert!(
+        kept.starts_with(run.place.path().to_str().unwrap()),
+        "{kept}"
+    );
+    let (status, words) = run.say(&["check", kept]);
+    assert_eq!(status, 6, "{words}");
+    assert!(words.contains("the world itself found"), "{words}");
+}
+
 #[test]
 fn dead_runs_stay_until_they_are_asked_to_go() {
     let mut run = Run::start(&SLOW);

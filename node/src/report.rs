@@ -3,12 +3,14 @@
 //! Responsible for: the files processes leave in the run's directory at exit, and the sum of them.
 //! Not responsible for: what is printed (the binary's) or what was measured (`histograms`).
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use shm_types::{Activity, Counters, Outcome};
+use world::{Checks, Invariant, Violation};
 
 use crate::histograms::Latencies;
 use crate::options::Role;
@@ -109,6 +111,55 @@ impl ActivityReport {
     }
 }
 
+/// How often one invariant was checked.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ChecksReport {
+    /// For how many robots, pairs of them or objects, summed over the ticks.
+    pub checks: u64,
+    /// For how many of these something had changed, so that it was looked at anew.
+    pub anew: u64,
+    /// How often it was found broken: the first time ends the run.
+    pub violations: u64,
+}
+
+/// How often the world checked its invariants.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InvariantsReport {
+    /// By name.
+    #[serde(flatten)]
+    pub by_name: BTreeMap<String, ChecksReport>,
+    /// Swept tests that took.
+    pub swept_tests: u64,
+}
+
+impl InvariantsReport {
+    /// What a world has counted, and what it has found.
+    #[must_use]
+    pub fn new(checks: &Checks, found: Option<Violation>) -> Self {
+        let of = |invariant: Invariant| ChecksReport {
+            checks: checks.made(invariant),
+            anew: checks.anew(invariant),
+            violations: u64::from(found.is_some_and(|found| found.invariant() == invariant)),
+        };
+        let names = Invariant::ALL.map(|invariant| (invariant.word().to_owned(), of(invariant)));
+        Self {
+            by_name: names.into(),
+            swept_tests: checks.swept_tests,
+        }
+    }
+
+    /// All together.
+    #[must_use]
+    pub fn total(&self) -> ChecksReport {
+        let all = self.by_name.values();
+        all.fold(ChecksReport::default(), |sum, one| ChecksReport {
+            checks: sum.checks + one.checks,
+            anew: sum.anew + one.anew,
+            violations: sum.violations + one.violations,
+        })
+    }
+}
+
 /// What the world knows at the end.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WorldReport {
@@ -140,10 +191,8 @@ pub struct WorldReport {
     pub scene_changes: u64,
     /// Claims on one task by two robots in one tick.
     pub selection_conflicts: u64,
-    /// Broken invariants.
-    pub violations: u64,
-    /// Swept tests made to check the invariants.
-    pub swept_tests: u64,
+    /// The invariants that were checked in every tick.
+    pub invariants: InvariantsReport,
     /// Ticks of each activity, per robot.
     pub activities: Vec<ActivityReport>,
 }

@@ -6,7 +6,7 @@
 use std::fmt;
 
 use shm_types::{Counters, Outcome, Verdict};
-use world::{ActivityTimes, Refused, WorldCounters};
+use world::{ActivityTimes, Refused, Violation, WorldCounters};
 
 /// One robot's account.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +34,8 @@ pub struct SimReport {
     pub state_hash: u64,
     /// What the world counted.
     pub world: WorldCounters,
+    /// The invariant that it found broken, if it did.
+    pub violation: Option<Violation>,
     /// The newest schedule that it refused.
     pub refused: Option<Refused>,
     /// How often the scene was changed.

@@ -394,6 +394,7 @@ impl<'s> Simulation<'s> {
             time_ns: self.snapshot.header.time_ns,
             state_hash: self.world.state_hash(),
             world: *self.world.counters(),
+            violation: self.world.violation(),
             refused: self.world.refused_schedule(),
             scene_version: self.world.scene_version(),
             robots: robots.collect(),

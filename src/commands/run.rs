@@ -128,6 +128,7 @@ pub(crate) fn frame(scene: &Scene, driver: &'static str, options: &RunOptions) -
         times: None,
         counts: Counts::default(),
         checker: None,
+        invariants: None,
         latency: Default::default(),
         roles: Vec::new(),
         ticks: 0,
@@ -156,6 +157,11 @@ pub(crate) fn complete(frame: RunResult, scene: &Scene, finished: Finished) -> R
     let mean = times.as_ref().map(|times| times.mean);
     let checker = finished.check.as_ref().map(checker);
     let (outcome, reason) = ending(scene, &finished, checker.as_ref());
+    let trace = frame.options.run.trace.as_ref();
+    let trace = trace.or(finished.evidence.as_ref());
+    if finished.evidence.is_some() {
+        notes.push("the trace was kept, since an invariant is broken in it".to_owned());
+    }
     // Another scene has other bounds.
     let is_same = world.scene_changes == 0;
     let bounds = Bounds::of(scene, BoundLimits::default()).filter(|_| is_same);
@@ -173,6 +179,7 @@ pub(crate) fn complete(frame: RunResult, scene: &Scene, finished: Finished) -> R
         times,
         counts: counts(&finished),
         checker,
+        invariants: Some(world.invariants.clone()),
         latency: finished
             .latency
             .summaries()
@@ -183,7 +190,7 @@ pub(crate) fn complete(frame: RunResult, scene: &Scene, finished: Finished) -> R
         state_hash: hex(world.state_hash),
         wall_s: finished.wall_s,
         oversubscribed: finished.oversubscribed,
-        trace: (frame.options.run.trace.as_ref()).map(|path| path.display().to_string()),
+        trace: trace.map(|path| path.display().to_string()),
         notes,
         ..frame
     }
@@ -226,7 +233,7 @@ fn ending(
 ) -> (Ending, Option<String>) {
     let reason = finished.reason.clone();
     let violations = checker.map_or(0, |checker| checker.violations);
-    if violations > 0 {
+    if violations > 0 && finished.outcome != RunOutcome::Violated {
         let found = format!(
             "the checker found {}",
             output::count(violations, "violation")

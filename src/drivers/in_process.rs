@@ -5,10 +5,10 @@
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use node::report::{ActivityReport, WorkReport};
+use node::report::{ActivityReport, InvariantsReport, WorkReport};
 use node::{Latencies, RunOptions, Timed, Told, WorldReport};
 use scene::Scene;
 use shm_types::{Activity, Checked, ControlKind, Outcome, WorldSnapshot};
@@ -71,8 +71,10 @@ pub(crate) fn run(
         ticks_answered: report.ticks,
         cpu_s: cpu_s(),
     };
+    let (check, evidence) = files.finish(ending(&report, options))?;
     Ok(Finished {
-        check: Some(files.finish(ending(&report, options))?),
+        check: Some(check),
+        evidence,
         wall_s,
         latency,
         roles: vec![role],
@@ -139,7 +141,7 @@ impl Files {
         Ok(())
     }
 
-    fn finish(self, ending: Ending) -> Result<CheckReport, Failure> {
+    fn finish(self, ending: Ending) -> Result<(CheckReport, Option<PathBuf>), Failure> {
         if let Some(mut file) = self.hashes {
             file.flush().map_err(unwritten)?;
         }
@@ -212,8 +214,7 @@ fn finished(report: SimReport) -> Finished {
             refused_schedule: report.refused.map(|refused| refused.to_string()),
             scene_changes: u64::from(report.scene_version),
             selection_conflicts: report.world.selection_conflicts,
-            violations: report.world.violations,
-            swept_tests: report.world.swept_tests,
+            invariants: InvariantsReport::new(&report.world.checks, report.violation),
             activities: activities.collect(),
         },
         work,
@@ -226,5 +227,6 @@ fn finished(report: SimReport) -> Finished {
         oversubscribed: false,
         notes: Vec::new(),
         check: None,
+        evidence: None,
     }
 }

@@ -8,6 +8,8 @@ pub(crate) mod interrupt;
 pub(crate) mod processes;
 pub(crate) mod recording;
 
+use std::path::PathBuf;
+
 use node::report::WorkReport;
 use node::{Latencies, WorldReport};
 use shm_types::Outcome;
@@ -34,4 +36,7 @@ pub(crate) struct Finished {
     pub(crate) notes: Vec<String>,
     /// What the checker says of the trace; nothing if there is none to read.
     pub(crate) check: Option<CheckReport>,
+    /// Where the trace was put for somebody to look at, since an invariant is broken in it and it
+    /// was not to be kept.
+    pub(crate) evidence: Option<PathBuf>,
 }

@@ -4,14 +4,17 @@
 //! Not responsible for: the processes.
 
 use std::env;
+use std::fs::File;
 use std::time::Duration;
 
 use node::domain::{DomainError, RunFile};
 use node::options::Recovery;
 use node::{Launcher, RunError, RunOptions, RunPlan, RunReport, supervisor};
 use scene::Scene;
+use shm_types::Outcome;
 
 use crate::drivers::Finished;
+use crate::drivers::recording::keep;
 use crate::exit::{Exit, Failure};
 use crate::progress::Progress;
 use crate::result::RoleLine;
@@ -36,8 +39,9 @@ pub(crate) fn run(
         silence_limit: Duration::from_secs_f64(process.silence_limit),
         ..plan(scene, options)?
     };
+    let is_kept = plan.options.trace.is_some();
     let report = supervisor::run(&plan, progress).map_err(refused)?;
-    Ok(checked(report))
+    Ok(checked(report, is_kept))
 }
 
 /// Goes on with the run of this id or name; its scene, its options and what came of it.
@@ -63,20 +67,36 @@ pub(crate) fn resume(
     let report = supervisor::resume(run, plan, progress).map_err(refused)?;
     let (scenario, options) = planned.ok_or_else(|| Failure::system("the run has no plan"))?;
     let scene = scene::parse(&scenario, "scenario.toml").map_err(Failure::system)?;
-    Ok((scene, options, checked(report)))
+    let is_kept = options.trace.is_some();
+    Ok((scene, options, checked(report, is_kept)))
 }
 
-/// What is left of a run, with what the checker says of its trace.
-fn checked(report: RunReport) -> Finished {
-    let check = report.trace.as_deref().map(trace::check_file).transpose();
-    let mut finished = finished(report);
-    match check {
-        Ok(check) => finished.check = check,
-        Err(error) => finished
-            .notes
-            .push(format!("the trace cannot be checked: {error}")),
+/// What is left of a run, with what the checker says of its trace. One that shows a broken
+/// invariant is kept, though it was not to be.
+fn checked(report: RunReport, is_kept: bool) -> Finished {
+    let mut notes = Vec::new();
+    let (mut check, mut evidence) = (None, None);
+    // While there is a report the trace can be read, and not after.
+    if let Some(path) = report.trace.as_deref() {
+        match trace::check_file(path) {
+            Ok(found) => check = Some(found),
+            Err(error) => notes.push(format!("the trace cannot be checked: {error}")),
+        }
+        let found = check.as_ref().is_some_and(|c| !c.violations.is_empty());
+        if !is_kept && (found || report.outcome == Outcome::Violated) {
+            match File::open(path).map_err(Into::into).and_then(keep) {
+                Ok(path) => evidence = Some(path),
+                Err(error) => notes.push(error.to_string()),
+            }
+        }
     }
-    finished
+    let mut finished = finished(report);
+    finished.notes.extend(notes);
+    Finished {
+        check,
+        evidence,
+        ..finished
+    }
 }
 
 /// A plan whose roles are this very program.
@@ -127,5 +147,6 @@ fn finished(report: RunReport) -> Finished {
         oversubscribed: report.oversubscribed,
         notes: report.notes,
         check: None,
+        evidence: None,
     }
 }

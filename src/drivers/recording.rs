@@ -6,6 +6,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, BufReader, BufWriter, Seek};
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -39,6 +40,8 @@ pub(crate) enum RecordingError {
 
 /// A trace that is being written.
 pub(crate) struct Recording {
+    /// Whether it was asked for.
+    kept: bool,
     writer: Writer<BufWriter<File>>,
     flushed: Instant,
 }
@@ -58,6 +61,7 @@ impl Recording {
             None => nameless()?,
         };
         Ok(Self {
+            kept: path.is_some(),
             writer: Writer::new(BufWriter::new(file), scene, state_every_ns)?,
             flushed: Instant::now(),
         })
@@ -99,38 +103,62 @@ impl Recording {
         Ok(self.writer.snapshot(snapshot)?)
     }
 
-    /// Ends the trace and checks it.
+    /// Ends the trace and checks it. If something is wrong in one that was not to be kept, it is
+    /// kept all the same, and this says where.
     ///
     /// # Errors
     /// The file cannot be written, or not read again.
-    pub(crate) fn finish(self, ending: Ending) -> Result<CheckReport, RecordingError> {
+    pub(crate) fn finish(
+        self,
+        ending: Ending,
+    ) -> Result<(CheckReport, Option<PathBuf>), RecordingError> {
         let mut file = self
             .writer
             .finish(ending)?
             .into_inner()
             .map_err(io::IntoInnerError::into_error)?;
         file.rewind()?;
-        Ok(trace::check(BufReader::new(file))?)
+        let report = trace::check(BufReader::new(&file))?;
+        let wanted = !self.kept && !report.violations.is_empty();
+        let evidence = wanted.then(|| keep(file)).transpose()?;
+        Ok((report, evidence))
     }
+}
+
+/// Copies a trace that has no name to where somebody can look at it.
+///
+/// # Errors
+/// The file cannot be read or the copy not written.
+pub(crate) fn keep(mut file: File) -> Result<PathBuf, RecordingError> {
+    let (path, mut copy) = temporary("rearrange-violation")?;
+    file.rewind()?;
+    io::copy(&mut file, &mut copy)?;
+    Ok(path)
 }
 
 /// A file that has no name any more: nothing is left of it whatever happens.
 fn nameless() -> Result<File, RecordingError> {
+    let (path, file) = temporary("rearrange")?;
+    fs::remove_file(&path).map_err(|source| RecordingError::Create { path, source })?;
+    Ok(file)
+}
+
+/// A new file in the directory for temporary ones, which only its owner can read.
+fn temporary(first: &str) -> Result<(PathBuf, File), RecordingError> {
     let since = SystemTime::now()
         .duration_since(UNIX_EPOCH)
         .unwrap_or_default();
-    let name = format!("rearrange-{}-{}.mcap", std::process::id(), since.as_nanos());
+    let name = format!("{first}-{}-{}.mcap", std::process::id(), since.as_nanos());
     let path = std::env::temp_dir().join(name);
     let file = create(&path, true)?;
-    fs::remove_file(&path).map_err(|source| RecordingError::Create { path, source })?;
-    Ok(file)
+    Ok((path, file))
 }
 
 fn create(path: &Path, new: bool) -> Result<File, RecordingError> {
     let mut options = File::options();
     options.read(true).write(true);
     if new {
-        options.create_new(true);
+        options.create_new(true).mode(0o600);
     } else {
         options.create(true).truncate(true);
     }

@@ -72,6 +72,26 @@ fn is_complete(result: &Value) {
     assert!(result["machine"]["cpu"].is_string());
     assert_eq!(result["checker"]["violations"], 0);
     assert!(result["checker"]["swept_tests"].is_u64());
+    let ticks = result["ticks"].as_u64().unwrap();
+    let robots = result["robots"].as_u64().unwrap();
+    let objects = result["objects"].as_u64().unwrap();
+    for (name, each) in [
+        ("robots", robots * (robots - 1) / 2),
+        ("object", robots),
+        ("wall", robots),
+        ("lost", objects),
+        ("motion", robots),
+        ("grants", robots * (robots - 1) / 2),
+    ] {
+        let checks = &result["invariants"][name];
+        assert_eq!(checks["checks"], ticks * each, "{name}");
+        assert_eq!(checks["violations"], 0, "{name}");
+        assert!(
+            checks["anew"].as_u64() <= checks["checks"].as_u64(),
+            "{name}"
+        );
+    }
+    assert!(result["invariants"]["swept_tests"].is_u64());
     for key in ["count", "p50_ns", "p99_ns", "p999_ns", "max_ns"] {
         assert!(
             result["latency"]["tick"][key].is_u64(),

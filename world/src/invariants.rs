@@ -50,6 +50,20 @@ impl Invariant {
         Self::Motion,
         Self::Grants,
     ];
+
+    /// Its name in results.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Robots => "robots",
+            Self::Object => "object",
+            Self::Wall => "wall",
+            Self::Holding => "holding",
+            Self::Lost => "lost",
+            Self::Motion => "motion",
+            Self::Grants => "grants",
+        }
+    }
 }
 
 /// How often each invariant was checked.

@@ -26,7 +26,7 @@ use crate::histograms::Timed;
 use crate::journal::{Found, Journal};
 use crate::options::Role;
 use crate::ports::{Access, Publisher};
-use crate::report::{ActivityReport, WorldReport};
+use crate::report::{ActivityReport, InvariantsReport, WorldReport};
 use crate::roles::{RoleError, Seat, Telling};
 use crate::ticker::{Due, Ticker};
 use crate::wait::Waiter;
@@ -356,8 +356,7 @@ impl Shell {
             refused_schedule: world.refused_schedule().map(|refused| refused.to_string()),
             scene_changes: u64::from(world.scene_version()),
             selection_conflicts: counters.selection_conflicts,
-            violations: counters.violations,
-            swept_tests: counters.swept_tests,
+            invariants: InvariantsReport::new(&counters.checks, world.violation()),
             activities: activities.collect(),
         }
     }
