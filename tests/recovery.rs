@@ -7,6 +7,7 @@
 
 mod live;
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 use std::process::Child;
@@ -298,6 +299,48 @@ fn a_broken_invariant_stops_the_run_and_keeps_its_trace() {
     let (status, words) = run.say(&["check", kept]);
     assert_eq!(status, 6, "{words}");
     assert!(words.contains("the world itself found"), "{words}");
+}
+
+/// Every file of shared memory that holds messages can be written by the one process that sends them;
+/// all others have mapped it to read. The journal is the world's alone.
+#[test]
+fn who_reads_messages_cannot_write_them() {
+    let mut run = Run::start(&SLOW);
+    let file = RunFile::read(&run.directory).unwrap();
+    let mut pids: Vec<u32> = Role::all(file.robots)
+        .map(|role| run.pid_of(role))
+        .collect();
+    pids.push(run.child.as_ref().unwrap().id());
+    let (mut writers, mut readers) = (BTreeMap::new(), 0);
+    let mut journals = Vec::new();
+    for pid in pids {
+        let maps = fs::read_to_string(format!("/proc/{pid}/maps")).unwrap();
+        for line in maps.lines() {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let [_, mode, .., path] = words[..] else {
+                continue;
+            };
+            if path.ends_with("/journal") {
+                journals.push(pid);
+            }
+            if !path.contains(&run.prefix) || !path.ends_with(".data") {
+                continue;
+            }
+            if mode.contains('w') {
+                let before = writers.insert(path.to_owned(), pid);
+                assert!(before.is_none_or(|before| before == pid), "{path}");
+            } else {
+                assert_eq!(mode, "r--s", "{path}");
+                readers += 1;
+            }
+        }
+    }
+    assert_eq!(journals, [run.pid_of(Role::World)]);
+    // Robots, planner and recorder send something each, and read the world.
+    let participants = Role::all(file.robots).count();
+    assert!(writers.len() >= participants, "{writers:?}");
+    assert!(readers >= participants, "{readers}");
+    assert_solved(&mut run);
 }
 
 #[test]

@@ -6,13 +6,17 @@
 //! Not responsible for: what a state is (crate `world`), or what is done with it (`roles::world`).
 //!
 //! Terms: a *slot* holds one state; tick k goes to slot k mod 2, so that the one before stays
-//! whole while it is written. The *ring* holds batches one after the other, the *index* where
+//! whole while it is written. A state comes in *parts* (crate `world`), each with a place of its own
+//! in the slot; only those are written that have changed since this slot was written last: what the
+//! tick before has changed comes from the other slot. While a slot is written it has no parts; that
+//! its parts are whole, and of one tick, their checksums say. The *ring* holds batches one after the other, the *index* where
 //! each lies. What a dead process has written stays in the page cache: nothing is ever synced, and
 //! a machine that fails takes its runs along.
 
 use std::collections::VecDeque;
 use std::fs::{File, OpenOptions};
 use std::io;
+use std::ops::Range;
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 use std::sync::atomic::{Ordering, compiler_fence};
@@ -25,7 +29,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 /// First word of the file: "rrjournl" in ASCII, little endian.
 const MAGIC: u64 = u64::from_le_bytes(*b"rrjournl");
 /// Form of the file. Raised whenever it changes.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Bytes of batches that are kept.
 const RING: usize = 4 << 20;
 /// Batches that are kept at most.
@@ -34,8 +38,10 @@ const KEPT: u64 = 8_192;
 const LARGEST: usize = size_of::<Entry>()
     + MAX_MOTIONS * size_of::<MotionRecord>()
     + MAX_EVENTS * size_of::<EventRecord>();
-/// Bytes in front of a state: its tick and its length.
+/// Bytes in front of a state: its tick, and how many parts it has.
 const SLOT_HEAD: usize = 16;
+/// Bytes of the length that each part begins with: that of the rest of it.
+const LENGTH: usize = 8;
 /// Where things lie.
 const INDEX: usize = 4_096;
 const RING_AT: usize = INDEX + KEPT as usize * size_of::<Place>();
@@ -81,12 +87,45 @@ struct Entry {
 /// A state that was found, and its tick.
 pub(crate) type Found = (u64, Vec<u8>);
 
+/// The places of a state's parts in a slot.
+struct Slots {
+    /// Where each begins and ends.
+    places: Vec<Range<usize>>,
+    /// Which parts are newer in the other slot, by slot.
+    stale: [Vec<bool>; 2],
+    /// How many parts states have.
+    parts: usize,
+}
+
+impl Slots {
+    fn new(rooms: &[usize]) -> Self {
+        let mut end = SLOT_HEAD;
+        let places = rooms.iter().map(|room| {
+            let start = end;
+            end += room.next_multiple_of(LENGTH);
+            start..end
+        });
+        Self {
+            places: places.collect(),
+            stale: [0, 1].map(|_| vec![false; rooms.len()]),
+            parts: 0,
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        self.places.last().map_or(SLOT_HEAD, |place| place.end)
+    }
+}
+
 /// The file, mapped.
 pub(crate) struct Journal {
     map: MmapMut,
-    slot_bytes: usize,
+    slots: Slots,
     generation: u32,
-    state: Vec<u8>,
+    copied: Vec<u8>,
+    /// A test lets its writer die after so many bytes.
+    #[cfg(test)]
+    dies_after: Option<usize>,
     /// Batches that can be read, oldest first, without gaps.
     kept: VecDeque<Place>,
     /// Where the next one is put.
@@ -94,15 +133,15 @@ pub(crate) struct Journal {
 }
 
 impl Journal {
-    /// Opens the journal of a run, or makes one with room for states of `slot_bytes`; the states
-    /// in it, newest first.
+    /// Opens the journal of a run, or makes one with room for states of parts of at most so many
+    /// bytes each; the states in it, newest first.
     ///
     /// # Errors
-    /// The system refused.
+    /// The system refused, or the journal has another form.
     pub(crate) fn open(
         path: &Path,
         run_id: u64,
-        slot_bytes: usize,
+        rooms: &[usize],
     ) -> io::Result<(Self, Vec<Found>)> {
         let file = OpenOptions::new()
             .read(true)
@@ -113,11 +152,12 @@ impl Journal {
             .open(path)?;
         let old = read_head(&file)?
             .filter(|head| head.magic == MAGIC && head.version == VERSION && head.run_id == run_id);
-        let slot_bytes = old.map_or(slot_bytes, |head| head.slot_bytes as usize);
-        let length = slot_bytes
-            .checked_mul(2)
-            .and_then(|slots| slots.checked_add(SLOTS_AT))
-            .ok_or(io::ErrorKind::InvalidData)?;
+        let slots = Slots::new(rooms);
+        let slot_bytes = slots.bytes();
+        if old.is_some_and(|head| head.slot_bytes != slot_bytes as u64) {
+            return Err(io::ErrorKind::InvalidData.into());
+        }
+        let length = SLOTS_AT + 2 * slot_bytes;
         if old.is_none() {
             file.set_len(0)?;
         }
@@ -130,9 +170,11 @@ impl Journal {
         let generation = old.map_or(0, |head| head.generation) + 1;
         let mut journal = Self {
             map,
-            slot_bytes,
+            copied: Vec::with_capacity(rooms.iter().copied().max().unwrap_or(0)),
+            slots,
             generation,
-            state: Vec::with_capacity(slot_bytes),
+            #[cfg(test)]
+            dies_after: None,
             kept: VecDeque::with_capacity(KEPT as usize + 1),
             next: 0,
         };
@@ -172,25 +214,40 @@ impl Journal {
         self.next = (self.kept.back()).map_or(0, |last| (last.offset + last.bytes) as usize);
     }
 
-    /// Keeps a batch, if there is one, and then the state that it led to.
+    /// Keeps a batch, if there is one, and then the state that it led to: of its parts those that
+    /// `save` hands over, which must be all that are not as they were at the last call, and all of
+    /// them at the first.
     ///
     /// # Errors
-    /// The state is longer than there is room for.
+    /// A part is longer than there is room for.
     pub(crate) fn commit(
         &mut self,
         tick: u64,
         batch: Option<&MotionBatch>,
-        save: impl FnOnce(&mut Vec<u8>),
+        save: impl FnOnce(&mut dyn FnMut(usize, &[u8])),
     ) -> io::Result<()> {
         if let Some(batch) = batch {
             self.keep(batch);
         }
-        let mut state = std::mem::take(&mut self.state);
-        state.clear();
-        save(&mut state);
-        let result = self.write_slot(tick, &state);
-        self.state = state;
-        result
+        let slot = (tick % 2) as usize;
+        let at = self.slot_at(slot);
+        // Of no parts while it is written: its reader need not find a torn one by its checksums.
+        self.put(at + 8, &0_u64.to_le_bytes());
+        self.put(at, &tick.to_le_bytes());
+        let mut result = Ok(());
+        save(&mut |part, bytes| {
+            if let Err(error) = self.put_part(slot, part, bytes) {
+                result = Err(error);
+            }
+        });
+        result?;
+        for part in 0..self.slots.parts {
+            if std::mem::take(&mut self.slots.stale[slot][part]) {
+                self.copy_part(slot, part);
+            }
+        }
+        self.put(at + 8, &(self.slots.parts as u64).to_le_bytes());
+        Ok(())
     }
 
     /// Whether another batch can be kept without losing one from `durable` on.
@@ -301,38 +358,63 @@ impl Journal {
     }
 
     fn slot_at(&self, slot: usize) -> usize {
-        SLOTS_AT + slot * self.slot_bytes
+        SLOTS_AT + slot * self.slots.bytes()
     }
 
-    fn write_slot(&mut self, tick: u64, state: &[u8]) -> io::Result<()> {
-        if SLOT_HEAD + state.len() > self.slot_bytes {
+    fn put_part(&mut self, slot: usize, part: usize, bytes: &[u8]) -> io::Result<()> {
+        let place = self.slots.places.get(part).cloned();
+        let Some(place) = place.filter(|place| bytes.len() <= place.len()) else {
             return Err(io::Error::other(format!(
-                "a state of {} bytes is more than the journal has room for",
-                state.len()
+                "part {part} of a state, of {} bytes, is more than the journal has room for",
+                bytes.len()
             )));
-        }
-        let at = self.slot_at((tick % 2) as usize);
-        // Of no length while it is written: its reader need not find a torn one by its checksum.
-        self.put(at + 8, &0_u64.to_le_bytes());
-        self.put(at, &tick.to_le_bytes());
-        self.put(at + SLOT_HEAD, state);
-        self.put(at + 8, &(state.len() as u64).to_le_bytes());
+        };
+        self.put(self.slot_at(slot) + place.start, bytes);
+        self.slots.stale[slot][part] = false;
+        self.slots.stale[1 - slot][part] = true;
+        self.slots.parts = self.slots.parts.max(part + 1);
         Ok(())
+    }
+
+    /// Takes a part over from the other slot.
+    fn copy_part(&mut self, slot: usize, part: usize) {
+        let mut copied = std::mem::take(&mut self.copied);
+        copied.clear();
+        if let Some(bytes) = self.part(1 - slot, part) {
+            copied.extend_from_slice(bytes);
+        }
+        self.put(self.slot_at(slot) + self.slots.places[part].start, &copied);
+        self.copied = copied;
+    }
+
+    /// A part, if it can be one.
+    fn part(&self, slot: usize, part: usize) -> Option<&[u8]> {
+        let at = self.slot_at(slot);
+        let place = self.slots.places.get(part)?;
+        let room = &self.map[at + place.start..at + place.end];
+        let length = u64::read_from_bytes(room.get(..LENGTH)?).ok()?;
+        room.get(..usize::try_from(length).ok()?.checked_add(LENGTH)?)
     }
 
     fn read_slot(&self, slot: usize) -> Option<Found> {
         let at = self.slot_at(slot);
-        let bytes = &self.map[at..at + self.slot_bytes];
-        let (head, rest) = bytes.split_at_checked(SLOT_HEAD)?;
-        let tick = u64::read_from_bytes(&head[..8]).ok()?;
-        let length = usize::try_from(u64::read_from_bytes(&head[8..]).ok()?).ok()?;
-        let state = rest.get(..length).filter(|state| !state.is_empty())?;
-        Some((tick, state.to_vec()))
+        let word = |at: usize| u64::read_from_bytes(&self.map[at..at + 8]).ok();
+        let (tick, parts) = (word(at)?, usize::try_from(word(at + 8)?).ok()?);
+        (1..=self.slots.places.len())
+            .contains(&parts)
+            .then_some(())?;
+        let mut state = Vec::new();
+        for part in 0..parts {
+            state.extend_from_slice(self.part(slot, part)?);
+        }
+        Some((tick, state))
     }
 
     /// Writes, after all that was written before. For another process that is enough: the kernel
     /// has what a process stored before it died, in the order of its stores.
     fn put(&mut self, at: usize, bytes: &[u8]) {
+        #[cfg(test)]
+        let bytes = self.as_far_as_it_lives(bytes);
         compiler_fence(Ordering::SeqCst);
         self.map[at..at + bytes.len()].copy_from_slice(bytes);
         compiler_fence(Ordering::SeqCst);
@@ -363,10 +445,43 @@ fn checksum(entry: &Entry, motions: &[u8], events: &[u8]) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
     use shm_types::{EventKind, zeroed};
 
-    const SLOT: usize = 1_000;
+    /// Three parts: one that is other in every tick, one in every third, one never.
+    const ROOMS: [usize; 3] = [48, 40, 24];
+
+    impl Journal {
+        /// Of what is written, as much as is before the writer's death.
+        pub(super) fn as_far_as_it_lives<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
+            let left = self.dies_after.unwrap_or(bytes.len()).min(bytes.len());
+            self.dies_after = self.dies_after.map(|bytes| bytes - left);
+            &bytes[..left]
+        }
+    }
+
+    fn framed(bytes: &[u8]) -> Vec<u8> {
+        [&(bytes.len() as u64).to_le_bytes(), bytes].concat()
+    }
+
+    /// Part `part` of the state at `tick`.
+    fn part(part: usize, tick: u64) -> Vec<u8> {
+        match part {
+            0 => framed(&tick.to_le_bytes().repeat(1 + tick as usize % 4)),
+            1 => framed(&vec![(tick / 3) as u8; 1 + (tick / 3) as usize % 30]),
+            _ => framed(b"always the same"),
+        }
+    }
+
+    fn state(tick: u64) -> Vec<u8> {
+        [0, 1, 2].map(|number| part(number, tick)).concat()
+    }
+
+    fn open(path: &Path) -> (Journal, Vec<Found>) {
+        Journal::open(path, 7, &ROOMS).unwrap()
+    }
 
     fn batch(sequence: u64, events: usize) -> Box<MotionBatch> {
         let mut batch: Box<MotionBatch> = zeroed();
@@ -378,10 +493,23 @@ mod tests {
         batch
     }
 
+    /// Hands over all parts, or those that are not as the tick before.
+    fn commit_parts(journal: &mut Journal, tick: u64, batch: Option<&MotionBatch>, all: bool) {
+        let save = |put: &mut dyn FnMut(usize, &[u8])| {
+            for number in [1, 2, 0] {
+                let bytes = part(number, tick);
+                if all || bytes != part(number, tick - 1) {
+                    put(number, &bytes);
+                }
+            }
+        };
+        journal.commit(tick, batch, save).unwrap();
+    }
+
     fn commit(journal: &mut Journal, tick: u64, events: usize) {
         let led = tick.checked_sub(1).map(|sequence| batch(sequence, events));
-        let save = |out: &mut Vec<u8>| out.extend_from_slice(&tick.to_le_bytes());
-        journal.commit(tick, led.as_deref(), save).unwrap();
+        let all = journal.slots.parts == 0;
+        commit_parts(journal, tick, led.as_deref(), all);
     }
 
     fn events_of(journal: &Journal, sequence: u64) -> Option<(u32, u64)> {
@@ -395,45 +523,85 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("journal");
         {
-            let (mut journal, found) = Journal::open(&path, 7, SLOT).unwrap();
+            let (mut journal, found) = open(&path);
             assert!(found.is_empty());
             for tick in 0..100 {
                 commit(&mut journal, tick, 3);
             }
         }
-        let (mut journal, found) = Journal::open(&path, 7, SLOT).unwrap();
+        let (mut journal, found) = open(&path);
         assert_eq!(journal.generation(), 2);
         let ticks: Vec<u64> = found.iter().map(|(tick, _)| *tick).collect();
         assert_eq!(ticks, [99, 98]);
-        assert_eq!(found[0].1, 99_u64.to_le_bytes());
+        assert!(found[0].1 == state(99) && found[1].1 == state(98));
         journal.go_on_from(99);
         assert_eq!(journal.kept_from(0), 0);
         assert_eq!(events_of(&journal, 98), Some((3, 98)));
         assert_eq!(events_of(&journal, 99), None);
         commit(&mut journal, 100, 1);
         assert_eq!(events_of(&journal, 99), Some((1, 99)));
-        let (_, found) = Journal::open(&path, 8, SLOT).unwrap();
+        let (_, found) = Journal::open(&path, 8, &ROOMS).unwrap();
         assert!(found.is_empty(), "of another run");
     }
 
     #[test]
-    fn a_writer_that_dies_in_the_middle_leaves_the_state_before() {
+    fn whatever_byte_its_writer_dies_at_one_state_is_whole() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("journal");
-        let (mut journal, _) = Journal::open(&path, 7, SLOT).unwrap();
+        let (mut before, mut after) = (0, 0);
+        // Part 1 is other at ticks 6 and 9: written in the first tick, copied in the next.
+        for last in 5..=8 {
+            for dies_after in 0.. {
+                let (mut journal, _) = open(&path);
+                for tick in 0..=last {
+                    commit(&mut journal, tick, 1);
+                }
+                journal.dies_after = Some(dies_after);
+                commit(&mut journal, last + 1, 1);
+                let lives = journal.dies_after != Some(0);
+                drop(journal);
+                let (mut journal, found) = open(&path);
+                let newest = found[0].0;
+                assert!(newest == last || newest == last + 1, "{newest}");
+                assert!(found.iter().all(|(tick, bytes)| *bytes == state(*tick)));
+                if newest == last {
+                    before += 1;
+                } else {
+                    after += 1;
+                }
+                journal.go_on_from(newest);
+                assert_eq!(events_of(&journal, newest - 1), Some((1, newest - 1)));
+                for tick in newest + 1..newest + 3 {
+                    commit(&mut journal, tick, 1);
+                    let found: Vec<_> = (0..2).filter_map(|s| journal.read_slot(s)).collect();
+                    let newest = found.iter().find(|(of, _)| *of == tick).unwrap();
+                    assert!(newest.1 == state(tick), "{tick}");
+                    assert!(found.iter().all(|(of, bytes)| *bytes == state(*of)));
+                }
+                if lives {
+                    assert_eq!(newest, last + 1, "it was not killed any more");
+                    break;
+                }
+                fs::remove_file(&path).unwrap();
+            }
+            fs::remove_file(&path).unwrap();
+        }
+        assert!(before > 300 && after >= 4, "{before} and {after}");
+    }
+
+    #[test]
+    fn a_batch_that_is_torn_is_none() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("journal");
+        let (mut journal, _) = open(&path);
         commit(&mut journal, 0, 0);
         commit(&mut journal, 1, 2);
-        let at = journal.slot_at(0);
-        journal.put(at + 8, &0_u64.to_le_bytes());
-        journal.put(at, &2_u64.to_le_bytes());
-        let torn = batch(1, 2);
-        journal.keep(&torn);
+        journal.keep(&batch(1, 2));
         let place = *journal.kept.back().unwrap();
         let at = RING_AT + place.offset as usize + size_of::<Entry>();
         journal.put(at, &[0xff]);
         drop(journal);
-        let (mut journal, found) = Journal::open(&path, 7, SLOT).unwrap();
-        assert_eq!(found.len(), 1);
+        let (mut journal, found) = open(&path);
         assert_eq!(found[0].0, 1);
         journal.go_on_from(2);
         assert_eq!(events_of(&journal, 1), None, "its checksum is wrong");
@@ -442,10 +610,22 @@ mod tests {
     }
 
     #[test]
+    fn a_journal_of_another_size_is_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("journal");
+        drop(open(&path));
+        let other = Journal::open(&path, 7, &[24, 24, 24]);
+        assert_eq!(
+            other.err().map(|error| error.kind()),
+            Some(io::ErrorKind::InvalidData)
+        );
+    }
+
+    #[test]
     fn what_is_needed_is_not_lost_while_there_is_room() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("journal");
-        let (mut journal, _) = Journal::open(&path, 7, SLOT).unwrap();
+        let (mut journal, _) = open(&path);
         let mut tick = 0;
         while journal.has_room(0) {
             commit(&mut journal, tick, 700);
@@ -462,13 +642,13 @@ mod tests {
         }
         assert!(journal.kept_from(tick) <= durable);
         assert_eq!(events_of(&journal, durable), Some((700, durable)));
-        let (mut again, _) = Journal::open(&path, 7, SLOT).unwrap();
+        let (mut again, _) = open(&path);
         again.go_on_from(tick - 1);
         assert_eq!(events_of(&again, durable), Some((700, durable)));
         assert!(commit_too_long(&mut again).is_err());
     }
 
     fn commit_too_long(journal: &mut Journal) -> io::Result<()> {
-        journal.commit(0, None, |out| out.resize(SLOT, 0))
+        journal.commit(0, None, |put| put(1, &[0; 41]))
     }
 }

@@ -10,6 +10,8 @@ use scene::{Scene, Vec2};
 
 pub(crate) use scene::near::Aabb;
 
+use crate::objects::Touched;
+
 /// Least size of a cell of objects, m.
 const LEAST_OBJECT_CELL_M: f64 = 0.1;
 
@@ -22,6 +24,7 @@ pub(crate) struct Ground {
     /// How far any object reaches from its centre.
     reach: Aabb,
     put_downs: u64,
+    touched: Touched,
 }
 
 impl Ground {
@@ -36,6 +39,7 @@ impl Ground {
             boxes,
             reach,
             put_downs: 0,
+            touched: Touched::ALL,
         };
         for object in 0..scene.objects.len() {
             if let Some(at) = place(object) {
@@ -48,6 +52,7 @@ impl Ground {
     /// Puts `object`, which is not on the ground, down at `at`.
     pub(crate) fn put(&mut self, object: usize, at: Vec2) {
         self.near.put(object, at);
+        self.touched.touch(object);
         self.put_downs += 1;
     }
 
@@ -64,6 +69,12 @@ impl Ground {
     /// Takes `object` off the ground.
     pub(crate) fn take(&mut self, object: usize) {
         self.near.take(object);
+        self.touched.touch(object);
+    }
+
+    /// Which objects may not lie where they lay at the last call.
+    pub(crate) const fn take_touched(&mut self) -> Touched {
+        self.touched.take()
     }
 
     /// Where `object` lies on the ground.

@@ -1,8 +1,9 @@
 //! The world's whole state as bytes: what a world process that is started again goes on from.
 //!
-//! Responsible for: every field that a later step depends on, in one canonical order, versioned
-//! and with a checksum; refusing what is no sound state of this scene.
-//! Not responsible for: where the bytes are kept (crate `node`).
+//! Responsible for: every field that a later step depends on, in one canonical order, versioned;
+//! refusing what is no sound state of this scene.
+//! Not responsible for: how the bytes are cut into parts, and their checksums (`parts.rs`); where
+//! they are kept (crate `node`).
 //!
 //! What a checkpoint is *of* is not in it: the scene (its hash is), the settings, and all that
 //! follows from these. Counts of exact tests may differ after a restoration, since they depend on
@@ -11,13 +12,14 @@
 use scene::{Scene, Settings, Vec2};
 use shm_types::{
     Activity, ConstraintTable, Counts, Failure, FailureCause, Grip, NONE, Outcome, Phase, Refusal,
-    StateHash, TaskStatus, Validate, Verdict, Wait,
+    TaskStatus, Validate, Verdict, Wait,
 };
 
 use crate::accounts::{ActivityTimes, WorldCounters};
 use crate::epoch::Epoch;
 use crate::guards::{Guard, Guards};
 use crate::invariants::{Checks, Violation};
+use crate::parts::{Parts, head_of};
 use crate::path::Path;
 use crate::saved::{Reader, Saved, Unreadable, save_bytes, saved, saved_as_bytes, saved_as_code};
 use crate::schedules::{Refused, Schedules};
@@ -27,11 +29,9 @@ use crate::step::World;
 use crate::track::Track;
 
 /// Form of the bytes. Raised whenever it changes.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// First bytes of each.
 const MAGIC: [u8; 4] = *b"rrck";
-/// Bytes of the checksum at the end.
-const CHECKSUM: usize = size_of::<u64>();
 /// Ticks and times past this are no run's.
 const MOST: u64 = 1 << 60;
 
@@ -294,10 +294,8 @@ impl Saved for Box<ConstraintTable> {
 }
 
 impl World {
-    /// Appends the whole state as it is between two steps to `out`, which needs no more room
-    /// than it had the time before unless the state has grown.
-    pub fn save(&self, out: &mut Vec<u8>) {
-        let begin = out.len();
+    /// Appends what changes in most ticks: all but constraints and objects.
+    pub(crate) fn save_head(&self, out: &mut Vec<u8>) {
         out.extend_from_slice(&MAGIC);
         let Self {
             settings,
@@ -305,12 +303,12 @@ impl World {
             time_ns,
             tick_m: _,
             robots,
-            objects,
+            objects: _,
             bodies,
             grants: _,
             guards: _,
             bars,
-            constraints,
+            constraints: _,
             epoch,
             schedules,
             scene_version,
@@ -324,6 +322,7 @@ impl World {
             violation,
             counters,
             cleared: _,
+            saving: _,
             wire,
         } = self;
         let header = &wire.header;
@@ -331,26 +330,19 @@ impl World {
         (*tick, *time_ns).save(out);
         (header.run_id, (header.state_hash, header.generation)).save(out);
         robots.save(out);
-        objects.save(out);
         bodies.tests().save(out);
-        for object in 0..objects.len() {
-            bodies.ground.place(object).save(out);
-        }
         bars.save(out);
-        constraints.save(out);
         epoch.save(out);
         schedules.save(out);
         (*scene_version, (*verdict, (*busy, *settled_ticks))).save(out);
         ((*held, *stopped), (*overflow, (*outcome, *violation))).save(out);
         counters.save(out);
-        let checksum = checksum(&out[begin..]);
-        checksum.save(out);
     }
 
     /// Hash of the scene that `bytes` are a state of, if they are one at all.
     #[must_use]
     pub fn scene_of(bytes: &[u8]) -> Option<u64> {
-        let mut from = Reader(bytes);
+        let mut from = head_of(bytes)?;
         (from.take(MAGIC.len()).ok()? == MAGIC).then_some(())?;
         (u32::restore(&mut from).ok()? == VERSION).then_some(())?;
         u64::restore(&mut from).ok()
@@ -388,28 +380,23 @@ impl World {
         bytes: &[u8],
         guards: Guards,
     ) -> Result<Self, CheckpointError> {
-        let end = (bytes.len().checked_sub(CHECKSUM)).ok_or(CheckpointError::Damaged)?;
-        let (state, sum) = bytes.split_at(end);
-        let is_whole = sum == checksum(state).to_le_bytes();
-        if !guards.holds(Guard::Checksum, is_whole) {
-            return Err(CheckpointError::Damaged);
-        }
-        let mut from = Reader(state);
+        let mut parts = Parts::of(bytes, guards)?;
+        let from = &mut parts.head;
         if from.take(MAGIC.len())? != MAGIC {
             return Err(CheckpointError::Foreign("program"));
         }
-        if u32::restore(&mut from)? != VERSION {
+        if u32::restore(from)? != VERSION {
             return Err(CheckpointError::Foreign("version"));
         }
-        if u64::restore(&mut from)? != scene.hash {
+        if u64::restore(from)? != scene.hash {
             return Err(CheckpointError::Foreign("scene"));
         }
-        if u64::restore(&mut from)? != settings.tick_ns {
+        if u64::restore(from)? != settings.tick_ns {
             return Err(CheckpointError::Foreign("length of a tick"));
         }
         let mut world = Self::new(scene, settings, 0);
         world.guards = guards;
-        world.read(scene, &mut from)?;
+        world.read(scene, parts)?;
         world.check(scene)?;
         let state_hash = world.wire.header.state_hash;
         world.write_wire();
@@ -418,25 +405,18 @@ impl World {
     }
 
     /// Puts what was saved in the place of the initial state.
-    fn read(&mut self, scene: &Scene, from: &mut Reader<'_>) -> Result<(), CheckpointError> {
-        let (robots, objects) = (self.robots.len(), self.objects.len());
+    fn read(&mut self, scene: &Scene, mut parts: Parts<'_>) -> Result<(), CheckpointError> {
+        let (robots, count) = (self.robots.len(), self.objects.len());
+        let from = &mut parts.head;
         (self.tick, self.time_ns) = Saved::restore(from)?;
         let header = &mut self.wire.header;
         (header.run_id, (header.state_hash, header.generation)) = Saved::restore(from)?;
         self.robots = Saved::restore(from)?;
-        self.objects = Saved::restore(from)?;
-        if (self.robots.len(), self.objects.len()) != (robots, objects) {
-            return Err(CheckpointError::Unsound("the number of robots or objects"));
+        if self.robots.len() != robots {
+            return Err(CheckpointError::Unsound("the number of robots"));
         }
         let tests = u64::restore(from)?;
-        let mut places: Vec<Option<Vec2>> = Vec::with_capacity(objects);
-        for _ in 0..objects {
-            places.push(Saved::restore(from)?);
-        }
-        self.bodies = self.bodies.of_version(scene, |object| places[object]);
-        self.bodies.go_on_counting(tests);
         self.bars.restore(from)?;
-        self.constraints.restore(from)?;
         self.epoch = Saved::restore(from)?;
         self.schedules = Saved::restore(from)?;
         (
@@ -448,11 +428,19 @@ impl World {
             (self.overflow, (self.outcome, self.violation)),
         ) = Saved::restore(from)?;
         self.counters = Saved::restore(from)?;
-        if from.0.is_empty() {
-            Ok(())
-        } else {
-            Err(CheckpointError::Unsound("what comes after its end"))
-        }
+        parts.end_head()?;
+        parts.constraints(|from| self.constraints.restore(from))?;
+        let mut objects: Vec<Object> = Vec::with_capacity(count);
+        let mut places: Vec<Option<Vec2>> = Vec::with_capacity(count);
+        parts.objects(count, |from| {
+            objects.push(Saved::restore(from)?);
+            places.push(Saved::restore(from)?);
+            Ok::<(), Unreadable>(())
+        })?;
+        self.objects = objects.into_iter().collect();
+        self.bodies = self.bodies.of_version(scene, |object| places[object]);
+        self.bodies.go_on_counting(tests);
+        Ok(())
     }
 
     /// Whether every id is that of something there is, and numbers are in range.
@@ -481,7 +469,7 @@ impl World {
             let waits_for = robot.link.waits_for.robot;
             sound("whom a robot waits for", id_in(waits_for, robots))?;
         }
-        for object in &self.objects {
+        for object in self.objects.iter() {
             sound("a holder", is_robot(object.holder))?;
             sound("who has claimed a task", is_robot(object.claimed_by))?;
         }
@@ -496,14 +484,10 @@ impl World {
     }
 }
 
-fn checksum(bytes: &[u8]) -> u64 {
-    let mut hash = StateHash::new();
-    hash.add(bytes);
-    hash.finish()
-}
-
 #[cfg(test)]
 mod tests {
+    use shm_types::StateHash;
+
     use super::*;
     use crate::testing::{BELOW, Bench, room};
 
@@ -527,13 +511,10 @@ mod tests {
         World::restore(&bench.scene, crate::testing::papers(), bytes)
     }
 
-    /// With a checksum that fits, so that what lies behind it is looked at.
-    fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
-        let end = bytes.len() - CHECKSUM;
-        let sum = checksum(&bytes[..end]);
-        bytes.truncate(end);
-        sum.save(&mut bytes);
-        bytes
+    /// Whatever its checksums: what lies behind them is looked at.
+    fn restore_anyhow(bench: &Bench, bytes: &[u8]) -> Result<World, CheckpointError> {
+        let settings = crate::testing::papers();
+        World::restore_without(&bench.scene, settings, bytes, Guard::Checksum)
     }
 
     #[test]
@@ -573,11 +554,11 @@ mod tests {
         let mut bench = bench();
         let bytes = saved(&bench);
         let (mut refused, mut taken) = (0, 0);
-        for at in 0..bytes.len() - CHECKSUM {
+        for at in 0..bytes.len() {
             for value in [0, 1, 0x7f, 0xff] {
                 let mut other = bytes.clone();
                 other[at] = value;
-                match restore(&bench, &sealed(other)) {
+                match restore_anyhow(&bench, &other) {
                     Err(_) => refused += 1,
                     Ok(world) => {
                         taken += 1;
@@ -598,8 +579,8 @@ mod tests {
         let error = World::restore(&other, crate::testing::papers(), &bytes).err();
         assert_eq!(error, Some(CheckpointError::Foreign("scene")));
         let mut newer = bytes.clone();
-        newer[MAGIC.len()] += 1;
-        let error = restore(&bench, &sealed(newer)).err();
+        newer[size_of::<u64>() + MAGIC.len()] += 1;
+        let error = restore_anyhow(&bench, &newer).err();
         assert_eq!(error, Some(CheckpointError::Foreign("version")));
         let slow = Settings {
             tick_ns: 1,

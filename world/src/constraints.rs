@@ -16,6 +16,8 @@ pub(crate) struct Constraints {
     before: Box<ConstraintTable>,
     /// Constraints of `in_force` from here on are still to be told.
     next: usize,
+    /// Any of this may not be what it was when it was saved last.
+    touched: bool,
 }
 
 impl Constraints {
@@ -25,6 +27,7 @@ impl Constraints {
             in_force: shm_types::zeroed(),
             before: shm_types::zeroed(),
             next: 0,
+            touched: true,
         }
     }
 
@@ -32,6 +35,7 @@ impl Constraints {
     /// that was.
     fn tell(&mut self, journal: &mut Journal<'_>) -> u64 {
         let mut told = 0;
+        self.touched |= !self.is_told();
         while let Some(found) = self.in_force.constraints().get(self.next)
             && journal.has_room_for_constraints()
         {
@@ -57,6 +61,7 @@ impl Constraints {
             in_force,
             before,
             next,
+            touched: _,
         } = self;
         in_force.save(out);
         before.save(out);
@@ -69,8 +74,14 @@ impl Constraints {
             in_force: Saved::restore(from)?,
             before: Saved::restore(from)?,
             next: Saved::restore(from)?,
+            touched: true,
         };
         Ok(())
+    }
+
+    /// Whether there was any change since the last call.
+    pub(crate) const fn take_touched(&mut self) -> bool {
+        std::mem::replace(&mut self.touched, false)
     }
 
     /// Both tables.
@@ -107,6 +118,7 @@ impl World {
             std::mem::swap(&mut constraints.in_force, &mut constraints.before);
             constraints.in_force.copy_from(table);
             constraints.next = 0;
+            constraints.touched = true;
             self.epoch.due = true;
             // A version that says nothing new lifts no bar: failures each followed by one would
             // otherwise go on for ever (rule 21).

@@ -55,14 +55,18 @@ impl World {
             robot.epoch_position = robot.position;
             robot.epoch_free = robot.link.live && robot.hand == Hand::Empty;
         }
-        for object in &mut self.objects {
+        for i in 0..self.objects.len() {
+            let object = &self.objects[i];
             // An object around which a grip closes is as good as held.
             let grip = object.claimed_by.map(|i| self.robots[i].hand);
-            object.epoch_status = match grip {
+            let status = match grip {
                 Some(Hand::Closing { .. }) => TaskStatus::Held,
                 _ => object.status,
             };
-            object.epoch_barred = object.barred;
+            if (object.epoch_status, object.epoch_barred) != (status, object.barred) {
+                let object = &mut self.objects[i];
+                (object.epoch_status, object.epoch_barred) = (status, object.barred);
+            }
         }
         journal.event(Event::new(EventKind::Epoch).value(self.epoch.number));
     }

@@ -36,6 +36,8 @@ mod guards;
 mod invariants;
 mod journal;
 mod motion;
+mod objects;
+mod parts;
 mod path;
 #[cfg(test)]
 mod random;
@@ -57,5 +59,6 @@ pub use checkpoint::CheckpointError;
 pub use control::FIRST_INCARNATION;
 pub use guards::Guard;
 pub use invariants::{Checks, Invariant, Violation};
+pub use objects::{MAX_PARTS, PER_PART};
 pub use schedules::{PublishedSchedule, Refused};
 pub use step::{World, WorldInput};

@@ -9,7 +9,8 @@ use scene::Scene;
 use shm_types::BodyKind;
 
 use crate::journal::Journal;
-use crate::state::{Object, Robot};
+use crate::objects::Objects;
+use crate::state::Robot;
 
 /// The tick in which the motion takes place.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +41,7 @@ impl Span {
 pub(crate) fn advance(
     scene: &Scene,
     robots: &mut [Robot],
-    objects: &mut [Object],
+    objects: &mut Objects,
     span: Span,
     journal: &mut Journal<'_>,
 ) {

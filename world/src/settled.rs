@@ -84,7 +84,7 @@ impl World {
         }
         let live = |i: &usize| self.robots[*i].link.live;
         let mut reason = StuckReason::default();
-        for object in &self.objects {
+        for object in self.objects.iter() {
             let waiting = object.status == TaskStatus::Waiting;
             let barred = waiting
                 && (0..self.robots.len())

@@ -21,6 +21,8 @@ use crate::guards::{Guard, Guards};
 use crate::invariants::Violation;
 use crate::journal::{Event, Journal};
 use crate::motion::{self, Span};
+use crate::objects::Objects;
+use crate::parts::Saving;
 use crate::schedules::{PublishedSchedule, Schedules};
 use crate::settled::Overflow;
 use crate::state::{Object, Robot};
@@ -54,7 +56,7 @@ pub struct World {
     /// Arc length of one tick at full speed, m.
     pub(crate) tick_m: f64,
     pub(crate) robots: Vec<Robot>,
-    pub(crate) objects: Vec<Object>,
+    pub(crate) objects: Objects,
     pub(crate) bodies: Bodies,
     pub(crate) grants: Grants,
     /// The checks that are made: all of them.
@@ -77,6 +79,8 @@ pub struct World {
     pub(crate) counters: WorldCounters,
     /// What the invariants have looked at, by robot.
     pub(crate) cleared: Vec<Cleared>,
+    /// What saving keeps from tick to tick.
+    pub(crate) saving: Saving,
     /// The snapshot as it will be published.
     pub(crate) wire: Box<WorldSnapshot>,
 }
@@ -86,7 +90,7 @@ impl World {
     #[must_use]
     pub fn new(scene: &Scene, settings: Settings, run_id: u64) -> Self {
         let robots: Vec<Robot> = scene.homes.iter().map(|&h| Robot::at_home(h)).collect();
-        let objects: Vec<Object> = scene
+        let objects: Objects = scene
             .objects
             .iter()
             .map(|o| Object {
@@ -122,6 +126,7 @@ impl World {
             violation: None,
             counters: WorldCounters::default(),
             cleared: vec![Cleared::nothing(); robots.len()],
+            saving: Saving::default(),
             settings,
             robots,
             objects,

@@ -37,7 +37,7 @@ impl World {
         for (out, robot) in self.wire.robots.iter_mut().zip(&self.robots) {
             write_robot(out, robot);
         }
-        for (out, object) in self.wire.objects.iter_mut().zip(&self.objects) {
+        for (out, object) in self.wire.objects.iter_mut().zip(self.objects.iter()) {
             write_object(out, object);
         }
     }

@@ -69,8 +69,8 @@ pub fn main(run_dir: &Path, incarnation: u32) -> Result<(), RoleError> {
 /// Opens the journal; the states that a world process before this one has left, newest first.
 fn open_journal(seat: &Seat) -> Result<(Journal, Vec<Found>), RoleError> {
     let path = seat.journal_path();
-    let room = outbox::room_for(seat.scene.counts(), &seat.options().settings);
-    Journal::open(&path, seat.run.id_number(), room).map_err(|error| RoleError::File {
+    let rooms = outbox::rooms_for(seat.scene.counts(), &seat.options().settings);
+    Journal::open(&path, seat.run.id_number(), &rooms).map_err(|error| RoleError::File {
         path,
         reason: error.to_string(),
     })
@@ -140,7 +140,9 @@ struct Shell {
 impl Shell {
     fn new(seat: &mut Seat) -> Result<Self, RoleError> {
         let (journal, found) = open_journal(seat)?;
-        let world = match restore(seat, &found)? {
+        let restored = restore(seat, &found)?;
+        let is_kept = restored.is_some();
+        let mut world = match restored {
             Some(world) => world,
             None => World::new(&seat.scene, seat.options().settings.clone(), NO_RUN),
         };
@@ -159,7 +161,7 @@ impl Shell {
             run_id: seat.run.id_number(),
             tick,
             ears: Ears::new(seat, &world)?,
-            outbox: Outbox::new(journal, motion, &world)?,
+            outbox: Outbox::new(journal, motion, &mut world, is_kept)?,
             batch: shm_types::zeroed(),
             world,
             changes,
@@ -283,7 +285,7 @@ impl Shell {
             hashes.add(self.world.state_hash())?;
         }
         let kept_ns = clock::now_ns();
-        self.outbox.keep(&self.batch, &self.world)?;
+        self.outbox.keep(&self.batch, &mut self.world)?;
         seat.record_since(Timed::Journal, kept_ns);
         self.ears.reply()?;
         self.outbox.send(self.tick, self.ears.recorded())

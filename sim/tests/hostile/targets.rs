@@ -405,7 +405,8 @@ impl Bench {
         if tape.below(8) == 0 {
             journal.truncate(tape.below(journal.len()));
         }
-        let from = journal.len().min(24);
+        // Past the first length, and what it says of itself.
+        let from = journal.len().min(32);
         tape.change(&mut journal[from..]);
         // Most are given a checksum that is right: the values are to be judged.
         let restored = if tape.below(8) == 0 {

@@ -19,7 +19,7 @@ use crate::topics::MOTION_WINDOW;
 
 /// How long the recorder may lack a batch that was sent before it is sent again.
 const AGAIN: Duration = Duration::from_millis(100);
-/// Bytes of a state for each robot, object, pair of both, and whatever else, at most.
+/// Bytes of a state for each robot, object, pair of both, and for whatever else is in a part, at most.
 const ROBOT_BYTES: usize = 1_024 + 2 * MAX_PATH_POINTS * 16;
 const OBJECT_BYTES: usize = 256;
 const PAIR_BYTES: usize = 64;
@@ -39,23 +39,33 @@ pub(super) struct Outbox {
     durable: u64,
 }
 
-/// Bytes that a state of a run of this size can come to need, in any version of its scene.
-pub(super) fn room_for(counts: Counts, settings: &Settings) -> usize {
+/// Bytes that each part of a state of a run of this size can come to need, in any version of its
+/// scene.
+pub(super) fn rooms_for(counts: Counts, settings: &Settings) -> Vec<usize> {
     let robots = counts.robots as usize;
-    let tables = if settings.method.plans_ahead() {
-        0
+    let (bars, tables) = if settings.method.plans_ahead() {
+        (0, 0)
     } else {
-        2 * MAX_CONSTRAINTS * size_of::<Constraint>() + robots * MAX_OBJECTS * PAIR_BYTES
+        (
+            robots * MAX_OBJECTS * PAIR_BYTES,
+            2 * MAX_CONSTRAINTS * size_of::<Constraint>(),
+        )
     };
-    OTHER_BYTES + robots * ROBOT_BYTES + MAX_OBJECTS * OBJECT_BYTES + tables
+    let head = OTHER_BYTES + robots * ROBOT_BYTES + bars;
+    let objects = std::iter::repeat_n(OBJECT_BYTES * world::PER_PART, world::MAX_PARTS);
+    [head, OTHER_BYTES + tables]
+        .into_iter()
+        .chain(objects)
+        .collect()
 }
 
 impl Outbox {
-    /// Goes on from where `world` is, and keeps that.
+    /// Goes on from where `world` is, and keeps that unless it comes from there.
     pub(super) fn new(
         mut journal: Journal,
         motion: Publisher<MotionBatch>,
-        world: &World,
+        world: &mut World,
+        is_kept: bool,
     ) -> Result<Self, RoleError> {
         let tick = world.tick();
         journal.go_on_from(tick);
@@ -67,7 +77,10 @@ impl Outbox {
             expected: (0, Instant::now()),
             durable: 0,
         };
-        outbox.commit(None, world)?;
+        // Writing a slot anew that others go on from would leave none if this process dies meanwhile.
+        if !is_kept {
+            outbox.commit(None, world)?;
+        }
         Ok(outbox)
     }
 
@@ -77,14 +90,13 @@ impl Outbox {
     }
 
     /// Keeps the tick that `batch` led to.
-    pub(super) fn keep(&mut self, batch: &MotionBatch, world: &World) -> Result<(), RoleError> {
+    pub(super) fn keep(&mut self, batch: &MotionBatch, world: &mut World) -> Result<(), RoleError> {
         self.commit(Some(batch), world)
     }
 
-    fn commit(&mut self, batch: Option<&MotionBatch>, world: &World) -> Result<(), RoleError> {
-        let saved = self
-            .journal
-            .commit(world.tick(), batch, |out| world.save(out));
+    fn commit(&mut self, batch: Option<&MotionBatch>, world: &mut World) -> Result<(), RoleError> {
+        let tick = world.tick();
+        let saved = (self.journal).commit(tick, batch, |put| world.save_changed(put));
         saved.map_err(|error| RoleError::File {
             path: super::super::JOURNAL_FILE.into(),
             reason: error.to_string(),
