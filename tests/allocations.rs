@@ -4,6 +4,7 @@
 //! Tick 0 is left out only because it is where memory set aside by then is first written.
 #![expect(clippy::unwrap_used, reason = "a test may fail")]
 
+#[path = "in_process/plans.rs"]
 mod plans;
 
 use std::alloc::{GlobalAlloc, Layout, System};

@@ -25,7 +25,9 @@ mod view;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::fmt;
+use tracing_subscriber::prelude::*;
 
 use crate::cli::{Cli, Command};
 use crate::exit::Outcome;
@@ -70,12 +72,15 @@ fn dispatch(command: Command) -> Outcome {
     }
 }
 
+/// What `RUST_LOG` asks for (`info`, or `node=debug,warn`), else warnings.
 fn log_to_stderr() {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
+    let asked = std::env::var("RUST_LOG").ok();
+    let filter = asked.and_then(|asked| asked.parse::<Targets>().ok());
+    let filter = filter.unwrap_or_else(|| Targets::new().with_default(LevelFilter::WARN));
     let colour = std::io::stderr().is_terminal() && !output::no_colour();
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .with_ansi(colour)
+    let lines = fmt::layer().with_writer(std::io::stderr).with_ansi(colour);
+    tracing_subscriber::registry()
+        .with(lines)
+        .with(filter)
         .init();
 }

@@ -1,6 +1,5 @@
 //! What `docs/guarantees.md` promises of small rooms, against a brute force that shares no code
 //! with the planner: all joint configurations of a room of unit cells, all robots moving at once.
-#![expect(clippy::unwrap_used, reason = "a test may fail")]
 
 use std::collections::HashSet;
 use std::fmt::Write as _;

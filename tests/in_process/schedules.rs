@@ -1,11 +1,8 @@
 //! Schedules as they are executed: robots follow plans written by hand, in one thread. Each run is
 //! traced and checked by a checker that shares no planning code (rule 26).
-#![expect(clippy::unwrap_used, reason = "a test may fail")]
 
-mod plans;
-
+use crate::plans::{CORRIDOR, corridor, go, schedule};
 use planner::{Planner, PlannerInput};
-use plans::{CORRIDOR, corridor, go, schedule};
 use robot::{Robot, RobotInput};
 use scene::{Method, Scene, Settings};
 use shm_types::{

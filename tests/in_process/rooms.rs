@@ -1,6 +1,5 @@
 //! Whole runs in one thread: every small scenario and random rooms, every number of robots, every
 //! method. Each run is traced and checked by a checker that shares no planning code (rule 26).
-#![expect(clippy::unwrap_used, reason = "a test may fail")]
 
 use std::ops::ControlFlow;
 

@@ -1,6 +1,5 @@
 //! Runs that something happens to: a goal, an object, a corridor or a robot is not as it was. Each
 //! is traced and checked by a checker that shares no code with what planned and moved.
-#![expect(clippy::unwrap_used, reason = "a test may fail")]
 
 use scene::{Change, Method, Scene, Settings};
 use shm_types::{Checked, ControlKind, Outcome};
@@ -8,7 +7,7 @@ use sim::{SimReport, Simulation};
 use trace::{Ending, SceneRecord, Writer};
 use world::{Blocked, NotMade};
 
-const ROOMS: &str = include_str!("rooms/two-rooms.toml");
+const ROOMS: &str = include_str!("../rooms/two-rooms.toml");
 
 fn rooms() -> Scene {
     scene::parse(ROOMS, "two-rooms").unwrap()
