@@ -70,7 +70,7 @@ const UNITS_PER_SMALL_CONFIGURATION: u64 = 10;
 /// One piece of a way that is reserved again, in work units.
 const UNITS_PER_PIECE: u64 = 4;
 /// One safe interval expanded, in work units.
-const UNITS_PER_INTERVAL: u64 = 12;
+const UNITS_PER_INTERVAL: u64 = 7;
 
 /// What comes next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -378,7 +378,9 @@ impl Anytime {
             let patience = PATIENCE_PER_ROBOT * solver.homes.len() as f64;
             let worth_s = solver.ground.seconds(makespan) * patience.min(MOST_PATIENCE);
             let until = solver.units() + units(worth_s);
-            Stage::Better(until.min(units(MOST_BEFORE_MOTION_S)))
+            // The last order that is tried should be done by then.
+            let most = units(MOST_BEFORE_MOTION_S).saturating_sub(solver.order_units);
+            Stage::Better(until.min(most))
         };
         let most = units_per_second.saturating_mul(MOST_S);
         let mut is_written = false;

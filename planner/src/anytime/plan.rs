@@ -450,10 +450,7 @@ impl Plan {
 /// Cells that a robot may not enter for objects whose reservations are looked at apart.
 fn closed_by(places: [Option<&Rc<Place>>; 2]) -> Vec<u32> {
     let places = places.into_iter().flatten();
-    let mut closed: Vec<u32> = places
+    places
         .flat_map(|place| place.bare.iter().copied())
-        .collect();
-    closed.sort_unstable();
-    closed.dedup();
-    closed
+        .collect()
 }

@@ -43,7 +43,7 @@ pub(crate) struct Leg {
     pub(crate) class: usize,
     pub(crate) target: Target,
     pub(crate) then: Then,
-    /// Cells closed to this leg beside what is reserved, sorted: its own objects on the ground.
+    /// Cells closed to this leg beside what is reserved: its own objects on the ground.
     pub(crate) closed: Vec<u32>,
     /// Whose reservations do not count: the object that is moved, where it is taken from, and one
     /// that was just put down.
@@ -91,9 +91,12 @@ pub(crate) struct Router {
     nodes: Vec<Node>,
     /// First node by leg and cell, of this round.
     heads: Vec<(u32, u32)>,
+    /// By leg and cell, the last round in which the leg was not to go there.
+    closed: Vec<u32>,
     round: u32,
     points: usize,
-    open: BinaryHeap<Reverse<(Time, Reverse<Time>, u32)>>,
+    /// Nodes to expand, the one with the least sum first, then the latest.
+    open: BinaryHeap<Reverse<(u64, u32)>>,
     /// Lower bound of what follows each leg.
     rest: Vec<Time>,
     /// Nodes expanded so far.
@@ -107,6 +110,7 @@ impl Router {
         Self {
             nodes: Vec::new(),
             heads: Vec::new(),
+            closed: Vec::new(),
             round: 0,
             points: ground.points(),
             open: BinaryHeap::new(),
@@ -142,7 +146,7 @@ impl Router {
                 closed: false,
             },
         );
-        while let Some(Reverse((_, _, index))) = self.open.pop() {
+        while let Some(Reverse((_, index))) = self.open.pop() {
             let node = self.nodes[index as usize];
             if node.closed {
                 continue;
@@ -172,8 +176,14 @@ impl Router {
         let needed = self.points * quest.legs.len();
         if self.heads.len() < needed {
             self.heads.resize(needed, (0, NO_NODE));
+            self.closed.resize(needed, 0);
         }
         self.round += 1;
+        for (marks, leg) in self.closed.chunks_mut(self.points).zip(quest.legs) {
+            for &cell in &leg.closed {
+                marks[cell as usize] = self.round;
+            }
+        }
         self.rest.clear();
         self.rest.resize(quest.legs.len(), 0);
         for index in (1..quest.legs.len()).rev() {
@@ -194,67 +204,78 @@ impl Router {
         Some(())
     }
 
+    /// The first node at a place of a leg, if there is one.
+    #[inline]
+    fn first(&self, slot: usize) -> u32 {
+        let (round, first) = self.heads[slot];
+        if round == self.round { first } else { NO_NODE }
+    }
+
+    /// The nodes at a place of a leg.
+    #[inline]
+    fn known(&self, slot: usize) -> impl Iterator<Item = (u32, &Node)> {
+        let node = |at: u32| self.nodes.get(at as usize).map(|node| (at, node));
+        std::iter::successors(node(self.first(slot)), move |(_, known)| node(known.next))
+    }
+
     fn offer(&mut self, quest: &Quest<'_>, node: Node) {
         let leg = &quest.legs[node.leg as usize];
-        let ahead = match &leg.target {
-            Target::Place(_, field) => match field[node.cell as usize].checked_sub(1) {
-                Some(ahead) => ahead,
-                None => return,
-            },
-            Target::Anywhere(_) => 0,
+        let Some(ahead) = leg.ahead(node.cell) else {
+            return;
         };
-        if node.time + ahead + self.rest[node.leg as usize] >= quest.limit {
+        let key = node.time + ahead + self.rest[node.leg as usize];
+        if key >= quest.limit {
             return;
         }
         let slot = node.leg as usize * self.points + node.cell as usize;
-        if self.heads[slot].0 != self.round {
-            self.heads[slot] = (self.round, NO_NODE);
-        }
-        let mut at = self.heads[slot].1;
-        let mut found = NO_NODE;
-        while at != NO_NODE {
-            let known = &self.nodes[at as usize];
-            if known.gap.from == node.gap.from {
-                if known.time <= node.time {
-                    return;
-                }
-                found = at;
-                break;
+        let same = (self.known(slot))
+            .find(|(_, known)| known.gap.from == node.gap.from)
+            .map(|(at, known)| (at, known.time, known.next));
+        let index = match same {
+            Some((_, time, _)) if time <= node.time => return,
+            Some((at, _, next)) => {
+                self.nodes[at as usize] = Node { next, ..node };
+                at
             }
-            at = known.next;
-        }
-        let key = node.time + ahead + self.rest[node.leg as usize];
-        let index = if found == NO_NODE {
-            let index = self.nodes.len() as u32;
-            let next = self.heads[slot].1;
-            self.heads[slot].1 = index;
-            self.nodes.push(Node { next, ..node });
-            index
-        } else {
-            let next = self.nodes[found as usize].next;
-            self.nodes[found as usize] = Node { next, ..node };
-            found
+            None => {
+                let next = self.first(slot);
+                let index = self.nodes.len() as u32;
+                self.heads[slot] = (self.round, index);
+                self.nodes.push(Node { next, ..node });
+                index
+            }
         };
-        self.open.push(Reverse((key, Reverse(node.time), index)));
+        let key = u64::from(key) << 32 | u64::from(!node.time);
+        self.open.push(Reverse((key, index)));
     }
 
     fn expand(&mut self, ground: &Ground, timeline: &Timeline, quest: &Quest<'_>, index: u32) {
         let node = self.nodes[index as usize];
         let leg = &quest.legs[node.leg as usize];
         let skip = quest.skip(node.leg as usize);
+        let rest = self.rest[node.leg as usize];
+        let marks = node.leg as usize * self.points;
         let mut steps = ground.walls(leg.class).steps(node.cell);
         while steps != 0 {
             let direction = steps.trailing_zeros() as usize;
             steps &= steps - 1;
             let next = node.cell.wrapping_add_signed(ground.offsets[direction]);
-            if leg.closes(next) {
-                continue;
-            }
-            let sides = sides(ground, node.cell, direction);
-            if sides.is_some_and(|sides| sides.iter().any(|&side| leg.closes(side))) {
-                continue;
-            }
             let takes = duration(direction);
+            let least = node.time + takes;
+            let in_time = |ahead: Time| least + ahead + rest < quest.limit;
+            if !leg.ahead(next).is_some_and(in_time) {
+                continue;
+            }
+            // Whatever interval is reached from here may have been reached no later before.
+            let is_late = |known: &Node| known.time <= least && known.gap.to >= node.gap.to;
+            if (self.known(marks + next as usize)).any(|(_, known)| is_late(known)) {
+                continue;
+            }
+            let is_closed = |cell: u32| self.closed[marks + cell as usize] == self.round;
+            let sides = sides(ground, node.cell, direction);
+            if is_closed(next) || sides.is_some_and(|sides| sides.into_iter().any(is_closed)) {
+                continue;
+            }
             let mut after = node.time;
             while let Some(gap) = timeline.gap_after(leg.class, next, after, skip) {
                 let earliest = node.time.max(gap.from);
@@ -375,9 +396,13 @@ impl Piece {
 }
 
 impl Leg {
+    /// The least time from a cell to the end of the leg; none if there is no way.
     #[inline]
-    fn closes(&self, cell: u32) -> bool {
-        !self.closed.is_empty() && self.closed.binary_search(&cell).is_ok()
+    fn ahead(&self, cell: u32) -> Option<Time> {
+        match &self.target {
+            Target::Place(_, field) => field[cell as usize].checked_sub(1),
+            Target::Anywhere(_) => Some(0),
+        }
     }
 
     #[inline]

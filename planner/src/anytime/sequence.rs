@@ -56,8 +56,8 @@ pub(crate) struct Sequencer {
     from: Vec<u32>,
     round: u32,
     queue: VecDeque<u32>,
-    /// Points to look at, the one nearest to where a way shall lead first.
-    ahead: BinaryHeap<(Reverse<i32>, u32)>,
+    /// Points to look at from either end of a way, the one nearest to the other end first.
+    ahead: [BinaryHeap<(Reverse<i32>, u32)>; 2],
     visited: HashSet<Vec<u32>>,
     random: ChaCha8Rng,
     /// Whether objects are tried in the order of dice.
@@ -98,7 +98,7 @@ impl Sequencer {
             from: vec![0; points],
             round: 0,
             queue: VecDeque::new(),
-            ahead: BinaryHeap::new(),
+            ahead: Default::default(),
             visited: HashSet::new(),
             random: ChaCha8Rng::seed_from_u64(7),
             is_shuffled: false,
@@ -159,6 +159,10 @@ impl Sequencer {
             .collect();
         if self.is_shuffled {
             open.shuffle(&mut self.random);
+        } else if let Some(&(last, _)) = steps.last() {
+            // Those before the one moved last could not move a moment ago.
+            let after = open.partition_point(|&object| object <= last);
+            open.rotate_left(after);
         }
         let missing = open
             .iter()
@@ -317,7 +321,7 @@ impl Sequencer {
             self.block(ground, places, object, ROBOT_ALONE.0);
             self.block_cells(&place.bare);
             self.reaches(ground, ROBOT_ALONE.0, &[place.grasp], &[]);
-            open.retain(|&home| self.seen[home as usize] == self.round);
+            open.retain(|&home| self.seen[home as usize] == self.mark(0));
             if open.is_empty() {
                 break;
             }
@@ -455,7 +459,7 @@ impl Sequencer {
         // Everything it can be brought to, nearest first.
         self.block(ground, places, aside, class);
         self.reaches(ground, class, &[from.grasp], &[]);
-        let round = self.round;
+        let reached_now = self.mark(0);
         let mut reached: Vec<u32> = Vec::new();
         let mut near = VecDeque::from([from.grasp]);
         let mut listed = vec![false; ground.points()];
@@ -465,7 +469,7 @@ impl Sequencer {
             for direction in 0..4 {
                 let next = cell.wrapping_add_signed(ground.offsets[direction]);
                 let within = (next as usize) < listed.len();
-                if within && self.seen[next as usize] == round && !listed[next as usize] {
+                if within && self.seen[next as usize] == reached_now && !listed[next as usize] {
                     listed[next as usize] = true;
                     near.push_back(next);
                 }

@@ -36,39 +36,49 @@ impl Sequencer {
         }
     }
 
-    /// Whether `to` can be reached from `from`, as blocked in this round: greedily.
+    /// Whether `to` can be reached from `from`, as blocked in this round: greedily, from both ends
+    /// in turn, since one of them may be shut in.
     pub(super) fn finds(&mut self, ground: &Ground, class: usize, from: u32, to: u32) -> bool {
         self.floods += 1;
-        self.ahead.clear();
         let walls = ground.walls(class);
-        let blocked = |this: &Self, cell: u32| this.blocked[cell as usize] == this.round;
-        if blocked(self, from) || blocked(self, to) || !walls.is_free(from) {
+        let is_blocked = |this: &Self, cell: u32| this.blocked[cell as usize] == this.round;
+        if is_blocked(self, from) || is_blocked(self, to) || !walls.is_free(from) {
             return false;
         }
-        let far = |cell: u32| {
-            let (dx, dy) = ground.offset(cell, to);
-            dx.abs() + dy.abs()
-        };
-        self.seen[from as usize] = self.round;
-        self.ahead.push((Reverse(far(from)), from));
-        while let Some((_, cell)) = self.ahead.pop() {
+        let ends = [from, to];
+        for (side, &end) in ends.iter().enumerate() {
+            self.ahead[side].clear();
+            self.ahead[side].push((Reverse(0), end));
+            self.seen[end as usize] = self.mark(side);
+        }
+        if from == to {
+            return true;
+        }
+        for side in [0, 1].into_iter().cycle() {
+            let Some((_, cell)) = self.ahead[side].pop() else {
+                break;
+            };
             self.cells += 1;
-            if cell == to {
-                return true;
-            }
             let steps = walls.steps(cell);
-            for direction in 0..4 {
+            for direction in (0..4).filter(|direction| steps >> direction & 1 == 1) {
                 let next = cell.wrapping_add_signed(ground.offsets[direction]);
-                if steps >> direction & 1 == 1
-                    && self.seen[next as usize] != self.round
-                    && !blocked(self, next)
-                {
-                    self.seen[next as usize] = self.round;
-                    self.ahead.push((Reverse(far(next)), next));
+                let seen = self.seen[next as usize];
+                if seen == self.mark(1 - side) {
+                    return true;
+                }
+                if seen != self.mark(side) && !is_blocked(self, next) {
+                    self.seen[next as usize] = self.mark(side);
+                    let (dx, dy) = ground.offset(next, ends[1 - side]);
+                    self.ahead[side].push((Reverse(dx.abs() + dy.abs()), next));
                 }
             }
         }
         false
+    }
+
+    /// What a point is marked with that was reached in this round, from either end.
+    pub(super) const fn mark(&self, side: usize) -> u32 {
+        2 * self.round + side as u32
     }
 
     /// Whether any of `to` can be reached from any of `from`, as blocked in this round.
@@ -83,7 +93,7 @@ impl Sequencer {
         self.queue.clear();
         for &cell in from {
             if self.blocked[cell as usize] != self.round && ground.walls(class).is_free(cell) {
-                self.seen[cell as usize] = self.round;
+                self.seen[cell as usize] = self.mark(0);
                 self.from[cell as usize] = u32::MAX;
                 self.queue.push_back(cell);
             }
@@ -97,10 +107,10 @@ impl Sequencer {
             for direction in 0..4 {
                 let next = cell.wrapping_add_signed(ground.offsets[direction]);
                 if steps >> direction & 1 == 1
-                    && self.seen[next as usize] != self.round
+                    && self.seen[next as usize] != self.mark(0)
                     && self.blocked[next as usize] != self.round
                 {
-                    self.seen[next as usize] = self.round;
+                    self.seen[next as usize] = self.mark(0);
                     self.from[next as usize] = cell;
                     self.queue.push_back(next);
                 }
