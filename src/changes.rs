@@ -52,6 +52,7 @@ struct Entry {
     open: Option<Open>,
     lose: Option<Robot>,
     back: Option<Robot>,
+    add_robot: Option<AddRobot>,
 }
 
 #[derive(Deserialize)]
@@ -86,6 +87,12 @@ struct Close {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Open {
+    at: [f64; 2],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AddRobot {
     at: [f64; 2],
 }
 
@@ -134,6 +141,18 @@ fn parse(text: &str, tick_ns: u64) -> Result<Vec<ToldAt>, String> {
     Ok(told)
 }
 
+/// How many robots are added.
+pub(crate) fn more_robots(told: &[ToldAt]) -> u32 {
+    let changes = told.iter().filter_map(|told| match &told.what {
+        Told::Change(changes) => Some(changes),
+        _ => None,
+    });
+    let added = changes
+        .flatten()
+        .filter(|change| matches!(change, Change::AddRobot { .. }));
+    added.count() as u32
+}
+
 impl Entry {
     fn what(self) -> Result<Told, &'static str> {
         let change = |change| Told::Change(vec![change]);
@@ -147,13 +166,17 @@ impl Entry {
             self.close
                 .map(|Close { r#box: corners }| change(Change::Close { corners })),
             self.open.map(|Open { at }| change(Change::Open { at })),
+            self.add_robot
+                .map(|AddRobot { at }| change(Change::AddRobot { at })),
             self.lose.map(|Robot { robot }| Told::Lose(robot)),
             self.back.map(|Robot { robot }| Told::Back(robot)),
         ];
         let mut given = all.into_iter().flatten();
         match (given.next(), given.next()) {
             (Some(what), None) => Ok(what),
-            _ => Err("give exactly one of goal, move, add-object, close, open, lose and back"),
+            _ => Err(
+                "give exactly one of goal, move, add-object, close, open, add-robot, lose and back",
+            ),
         }
     }
 }
@@ -172,6 +195,9 @@ mod tests {
             at_s = 2.004
             add-object = { at = [1.0, 1.0], goal = [2.0, 2.0], like = 3 }
             [[change]]
+            at_s = 2.0
+            add-robot = { at = [3.0, 1.0] }
+            [[change]]
             at_s = 3.5
             lose = { robot = 2 }
         ";
@@ -186,6 +212,7 @@ mod tests {
                 goal: Some([2.0, 2.0]),
                 like: 3,
             },
+            Change::AddRobot { at: [3.0, 1.0] },
         ];
         let expected = [
             ToldAt {
@@ -198,6 +225,7 @@ mod tests {
             },
         ];
         assert_eq!(told, expected);
+        assert_eq!(more_robots(&told), 1);
     }
 
     #[test]

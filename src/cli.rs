@@ -379,6 +379,12 @@ pub(crate) enum What {
         #[arg(value_names = ["X", "Y"], num_args = 2, required = true, allow_negative_numbers = true, value_parser = number(-1e5, 1e5))]
         at: Vec<f64>,
     },
+    /// There is one more robot, at home; it gets the next number, and a process of its own
+    AddRobot {
+        /// Where its centre is: its home
+        #[arg(value_names = ["X", "Y"], num_args = 2, required = true, allow_negative_numbers = true, value_parser = number(-1e5, 1e5))]
+        at: Vec<f64>,
+    },
     /// A robot takes part no more: it stays where it is, with what it holds, as an obstacle
     Lose {
         /// Number of the robot

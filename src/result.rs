@@ -33,7 +33,7 @@ pub(crate) struct RunResult {
     pub(crate) options: Options,
     pub(crate) machine: Machine,
     pub(crate) method: String,
-    /// Number of robots.
+    /// Number of robots, with those that were added on the way.
     pub(crate) robots: usize,
     /// Number of objects.
     pub(crate) objects: usize,
@@ -111,7 +111,8 @@ pub(crate) struct Times {
     pub(crate) per_robot: Vec<RobotTimes>,
 }
 
-/// How one robot spent its time, world seconds. The five sum up to the makespan.
+/// How one robot spent its time, world seconds. The five sum up to the makespan; of a robot that was
+/// added on the way, the time before counts as idle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct RobotTimes {
     pub(crate) moving_s: f64,

@@ -11,7 +11,9 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use node::options::{Clock, DEFAULT_MONITORS, DEFAULT_RATE_HZ, MAX_MONITORS, MAX_RATE_HZ};
-use node::options::{DEFAULT_SILENCE_LIMIT, Delay, GiveUp, Restart, Role, Wait};
+use node::options::{
+    DEFAULT_MORE_ROBOTS, DEFAULT_SILENCE_LIMIT, Delay, GiveUp, Restart, Role, Wait,
+};
 use scene::{Compute, HardMode, Method, Performance, Settings};
 use serde::de::DeserializeOwned;
 use serde::de::value::{Error as NameError, StrDeserializer};
@@ -136,6 +138,9 @@ pub(crate) struct ProcessArgs {
     /// Places kept free for programs that watch
     #[arg(long, value_name = "N", default_value_t = DEFAULT_MONITORS, value_parser = clap::value_parser!(u32).range(0..=i64::from(MAX_MONITORS)))]
     pub(crate) monitors: u32,
+    /// Robots that `rearrange tell` can add on the way: shared memory has room for them
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_MORE_ROBOTS, value_parser = clap::value_parser!(u32).range(0..MAX_ROBOTS))]
+    pub(crate) more_robots: u32,
     /// What follows when a process dies: it is started again and takes up where it was; likewise,
     /// but a robot waits for `rearrange tell release`; or it is gone for good
     #[arg(long, value_name = "WHAT", default_value = "auto", value_parser = named::<Restart>(&["auto", "hold", "never"]))]

@@ -181,6 +181,24 @@ fn what_changes_on_the_way_changes_alike_whatever_drives_the_run() {
 }
 
 #[test]
+fn robots_that_are_added_come_alike_whatever_drives_the_run() {
+    let rooms = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/rooms/two-rooms.toml");
+    let changes = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/rooms/more-robots.toml");
+    for method in [&["--method", "anytime"], PAPERS] {
+        let told = [&["--changes", changes][..], method].concat();
+        let expected = hashes(rooms, &[IN_PROCESS, &told].concat());
+        assert_same(rooms, &expected, &hashes(rooms, &told), method[1]);
+        for role in ["world", "robot-2"] {
+            let delay = format!("{role}=20x30");
+            let late = [&["--delay", delay.as_str()][..], &told].concat();
+            assert_same(rooms, &expected, &hashes(rooms, &late), method[1]);
+        }
+        let without = hashes(rooms, &[IN_PROCESS, method].concat());
+        assert_ne!(expected, without, "nobody has come");
+    }
+}
+
+#[test]
 fn lockstep_waits_for_a_stopped_robot() {
     let room = "paper-17a";
     let expected = hashes(room, IN_PROCESS);

@@ -344,6 +344,35 @@ fn who_reads_messages_cannot_write_them() {
 }
 
 #[test]
+fn a_robot_that_was_added_is_started_again_as_the_others_are() {
+    let mut run = Run::start(&SLOW);
+    let robot = Role::Robot(2);
+    let (status, words) = run.say(&["tell", "add-robot", "3.5", "0.5"]);
+    assert_eq!(status, 0, "{words}");
+    run.await_ready(robot, 1);
+    assert!(run.say(&["list"]).1.contains(" 3 "), "so many robots");
+    for (role, count) in [(robot, 2), (Role::World, 2), (Role::Planner, 2), (robot, 3)] {
+        kill(run.pid_of(role), libc::SIGKILL);
+        run.await_ready(role, count);
+    }
+    run.kill_supervisor();
+    wait_until("the end of its processes", || {
+        run.say(&["list"]).1.contains("can be resumed")
+    });
+    let resume = binary(run.place.path())
+        .args(["resume", "--json"])
+        .spawn()
+        .unwrap();
+    run.child = Some(resume);
+    run.await_ready(robot, 4);
+    kill(run.pid_of(robot), libc::SIGKILL);
+    run.await_ready(robot, 5);
+    let result = assert_solved(&mut run);
+    assert_eq!(result["robots"], 3);
+    assert_eq!(result["counts"]["scene_changes"], 1);
+}
+
+#[test]
 fn dead_runs_stay_until_they_are_asked_to_go() {
     let mut run = Run::start(&SLOW);
     run.kill_supervisor();

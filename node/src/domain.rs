@@ -182,6 +182,7 @@ impl RunDirectory {
             scenario: new.scenario.to_owned(),
             scenario_hash: new.scenario_hash,
             robots: new.counts.robots,
+            most_robots: new.options.room(new.counts).robots,
             objects: new.counts.objects,
             shared_memory_bytes: new.shared_memory_bytes,
             supervisor_pid: std::process::id(),

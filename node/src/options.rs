@@ -15,6 +15,7 @@ use std::path::PathBuf;
 use scene::{Change, Settings};
 use serde::{Deserialize, Serialize};
 use shm_types::Counts;
+use shm_types::capacity::{MAX_OBJECTS, MAX_ROBOTS};
 
 pub use plan::{DEFAULT_GIVE_UP_AFTER, DEFAULT_SETUP_DEADLINE, DEFAULT_SILENCE_LIMIT};
 pub use plan::{GiveUp, Launcher, Recovery, Restart, RunPlan};
@@ -28,6 +29,8 @@ pub const MAX_RATE_HZ: u32 = 100_000;
 pub const DEFAULT_MONITORS: u32 = 4;
 /// Most such places.
 pub const MAX_MONITORS: u32 = 64;
+/// Default number of robots that can be added to a run.
+pub const DEFAULT_MORE_ROBOTS: u32 = 2;
 /// Default rate of whole states in the trace, per second of world time.
 pub const DEFAULT_STATE_RATE_HZ: f64 = 10.0;
 
@@ -115,6 +118,8 @@ pub struct RunOptions {
     pub realtime_scheduling: bool,
     /// Places kept free for programs that watch.
     pub monitors: u32,
+    /// Robots that can be added on the way: shared memory has room for them.
+    pub more_robots: u32,
     /// Whole states in the trace, per second of world time.
     pub state_rate_hz: f64,
     /// Ticks from the first on whose latencies are not kept.
@@ -140,6 +145,7 @@ impl RunOptions {
             pin: false,
             realtime_scheduling: false,
             monitors: DEFAULT_MONITORS,
+            more_robots: DEFAULT_MORE_ROBOTS,
             state_rate_hz: DEFAULT_STATE_RATE_HZ,
             warm_up_ticks: 0,
             delays: Vec::new(),
@@ -188,11 +194,11 @@ pub enum OptionError {
         range: &'static str,
     },
     /// A delay for a robot that does not exist.
-    #[error("{role} is to be delayed, but there are only {robots} robots, counted from 0")]
+    #[error("{role} is to be delayed, but there is only room for {robots} robots, counted from 0")]
     Delay {
         /// Who.
         role: Role,
-        /// Robots there are.
+        /// Robots there can be.
         robots: u32,
     },
 }
@@ -204,6 +210,16 @@ pub const fn processes(counts: Counts) -> usize {
 }
 
 impl RunOptions {
+    /// What a run that begins with `counts` can come to have.
+    #[must_use]
+    pub fn room(&self, counts: Counts) -> Counts {
+        let robots = counts.robots.saturating_add(self.more_robots);
+        Counts {
+            robots: robots.min(MAX_ROBOTS as u32),
+            objects: MAX_OBJECTS as u32,
+        }
+    }
+
     /// Refuses what cannot work with this many processes on this many cores.
     ///
     /// # Errors
@@ -243,13 +259,14 @@ impl RunOptions {
         let rate = self.state_rate_hz;
         let fine = rate.is_finite() && rate >= 0.0;
         in_range("the state rate", rate, "0 or a positive number", fine)?;
+        let robots = self.room(counts).robots;
         for delay in &self.delays {
             if let Role::Robot(index) = delay.role
-                && index >= counts.robots
+                && index >= robots
             {
                 return Err(OptionError::Delay {
                     role: delay.role,
-                    robots: counts.robots,
+                    robots,
                 });
             }
         }

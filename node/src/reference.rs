@@ -76,8 +76,9 @@ pub fn run(plan: &RunPlan) -> Result<ReferenceReport, RunError> {
     let counts = scene.counts();
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     plan.options.check(counts, cores)?;
-    let topics = Topics::of(counts, plan.options.settings.method, plan.options.monitors);
-    let participants = u64::from(counts.robots + plan.options.monitors) + 4;
+    let room = plan.options.room(counts);
+    let topics = Topics::of(room, plan.options.settings.method, plan.options.monitors);
+    let participants = u64::from(room.robots + plan.options.monitors) + 4;
     shared_memory::reserve(topics.bytes(), participants)?;
     let signals = Signals::watch().map_err(RunError::Signals)?;
     let mut options = plan.options.clone();

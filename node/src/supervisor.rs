@@ -26,7 +26,7 @@ use scene::Scene;
 use shm_types::{Checked, ControlKind, ControlRequest, Counts, Outcome, RoleKind, WorldSnapshot};
 
 use crate::domain::{DomainError, NewRun, RunDirectory, RunFile};
-use crate::options::{self, OptionError, Role, RunOptions, RunPlan};
+use crate::options::{OptionError, Role, RunOptions, RunPlan};
 use crate::ports::{self, IpcNode, TopicError};
 use crate::report::RunReport;
 use crate::shared_memory::{self, ResourceError};
@@ -151,8 +151,7 @@ pub fn resume(
     let (directory, file) = RunDirectory::take_over(run)?;
     let scenario = RunFile::read_scenario(directory.path())?;
     let plan = plan(&file, scenario);
-    let scene = parse(&plan)?;
-    carry_out(Run::begin(&plan, &scene, directory, file)?, observer)
+    carry_out(Run::begin(&plan, directory, file)?, observer)
 }
 
 fn carry_out(mut run: Run<'_>, observer: &mut dyn Observer) -> Result<RunReport, RunError> {
@@ -197,7 +196,6 @@ struct Run<'p> {
     /// By when the world has to have ended the run, once it is asked to; when it was asked last.
     stop_by: Option<(Instant, Instant)>,
     notes: Vec<String>,
-    oversubscribed: bool,
 }
 
 impl<'p> Run<'p> {
@@ -207,10 +205,11 @@ impl<'p> Run<'p> {
         let counts = scene.counts();
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         plan.options.check(counts, cores)?;
-        let topics = Topics::of(counts, plan.options.settings.method, plan.options.monitors);
+        let room = plan.options.room(counts);
+        let topics = Topics::of(room, plan.options.settings.method, plan.options.monitors);
         let mut options = plan.options.clone();
         options.settings.tick_ns = options.clock.tick_ns(options.settings.tick_ns);
-        reserve(&topics, counts, &options)?;
+        reserve(&topics, room, &options)?;
         let (directory, file) = RunDirectory::create(&NewRun {
             name: plan.name.as_deref(),
             scenario_text: &plan.scenario,
@@ -222,21 +221,14 @@ impl<'p> Run<'p> {
             recovery: plan.recovery,
             silence_limit_s: plan.silence_limit.as_secs_f64(),
         })?;
-        Self::begin(plan, &scene, directory, file)
+        Self::begin(plan, directory, file)
     }
 
     /// Makes the topics of a run that has a place.
-    fn begin(
-        plan: &'p RunPlan,
-        scene: &Scene,
-        directory: RunDirectory,
-        file: RunFile,
-    ) -> Result<Self, RunError> {
-        let counts = scene.counts();
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    fn begin(plan: &'p RunPlan, directory: RunDirectory, file: RunFile) -> Result<Self, RunError> {
         let options = &file.options;
-        let topics = Topics::of(counts, options.settings.method, options.monitors);
-        reserve(&topics, counts, options)?;
+        let topics = Topics::of(file.room(), options.settings.method, options.monitors);
+        reserve(&topics, file.room(), options)?;
         let signals = Signals::watch().map_err(RunError::Signals)?;
         let mut diary = Diary::open(directory.path()).map_err(|source| DomainError::File {
             path: directory.path().join(DIARY_FILE),
@@ -249,20 +241,9 @@ impl<'p> Run<'p> {
         make_private(&file)?;
         let janitor = Janitor::start(file.prefix.clone()).map_err(RunError::Signals)?;
         let topics = topics.create(&node)?;
-        let started = diary::started(directory.path());
-        let before = |role| {
-            let of_role = started.iter().filter(|(who, _)| *who == role);
-            // One more may have been started and not been noted.
-            of_role
-                .map(|(_, incarnation)| incarnation + 1)
-                .max()
-                .unwrap_or(0)
-        };
-        Ok(Self {
+        let mut run = Self {
             plan,
-            members: Role::all(file.robots)
-                .map(|role| Member::new(role, before(role)))
-                .collect(),
+            members: Vec::new(),
             watch: Watch::new(&topics, &file)?,
             janitor,
             _topics: topics,
@@ -276,9 +257,24 @@ impl<'p> Run<'p> {
             open_tasks: None,
             stop_by: None,
             notes: Vec::new(),
-            oversubscribed: options::processes(counts) > cores,
             file,
-        })
+        };
+        for role in Role::all(run.file.robots) {
+            run.enlist(role);
+        }
+        Ok(run)
+    }
+
+    /// Makes room for the processes of a participant: the first is due now.
+    fn enlist(&mut self, role: Role) {
+        let started = diary::started(self.directory.path()).into_iter();
+        // One more may have been started and not been noted.
+        let before = started
+            .filter(|(who, _)| *who == role)
+            .map(|(_, incarnation)| incarnation + 1);
+        self.members
+            .push(Member::new(role, before.max().unwrap_or(0)));
+        self.watch.add(role);
     }
 
     /// Watches until the run is over. Shared memory that fails ends it too.
@@ -361,8 +357,8 @@ impl<'p> Run<'p> {
 }
 
 /// Holds what a run needs against what there is.
-fn reserve(topics: &Topics, counts: Counts, options: &RunOptions) -> Result<(), ResourceError> {
-    let participants = u64::from(counts.robots + options.monitors) + 5;
+fn reserve(topics: &Topics, room: Counts, options: &RunOptions) -> Result<(), ResourceError> {
+    let participants = u64::from(room.robots + options.monitors) + 5;
     shared_memory::reserve(topics.bytes(), participants)
 }
 

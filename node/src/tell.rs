@@ -69,7 +69,7 @@ pub fn tell(run: &str, told: &Told) -> Result<Answered, TellError> {
     }
     let node = ports::join(&run.root, &run.prefix, "tell")?;
     let options = &run.options;
-    let topics = Topics::of(run.counts(), options.settings.method, options.monitors);
+    let topics = Topics::of(run.room(), options.settings.method, options.monitors);
     let by = Instant::now() + PATIENCE;
     // A run is live before all of it is there.
     let service = loop {

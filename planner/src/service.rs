@@ -298,6 +298,7 @@ impl Planner {
             ..Self::new(scene, settings)
         };
         self.table.complete_for_events = u64::MAX;
+        self.answered.resize(scene.homes.len(), None);
         if let Some(anytime) = &mut self.anytime {
             anytime.replan(snapshot);
         }

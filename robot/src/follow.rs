@@ -70,20 +70,20 @@ impl Follower {
         if self.scene_version != version {
             (self.scene_version, self.last) = (version, None);
         }
-        let Some(schedule) = now.schedule else {
+        let part = now.schedule.and_then(|schedule| schedule.part(now.id));
+        let (Some(schedule), Some(part)) = (now.schedule, part) else {
             intent.claim = select::claim(now, now.holding());
             return (Phase::Selecting, without_schedule(now));
         };
-        let part = &schedule.robots[now.id];
         let due = self.due(now, schedule);
-        let next = next_grasp(now, schedule, due);
+        let next = next_grasp(now, (schedule, part), due);
         intent.claim = select::claim(now, now.holding().or_else(|| may_claim(now, next)));
         match due {
             Some(due) if now.me().grant_count == 0 => grip(now, due),
             Some(_) => (under_way(now, next, part), Doing::waiting(u64::MAX)),
             None => {
                 intent.waits_for = waits_for(now, schedule);
-                let doing = self.go_on(now, schedule, intent);
+                let doing = self.go_on(now, (schedule, part), intent);
                 (under_way(now, next, part), doing)
             }
         }
@@ -110,9 +110,13 @@ impl Follower {
     }
 
     /// Asks for what comes next as soon as it may.
-    fn go_on(&mut self, now: &Now<'_>, schedule: &Schedule, intent: &mut Intent) -> Doing {
+    fn go_on(
+        &mut self,
+        now: &Now<'_>,
+        (schedule, part): (&Schedule, &RobotSchedule),
+        intent: &mut Intent,
+    ) -> Doing {
         let me = now.me();
-        let part = &schedule.robots[now.id];
         match intent.asked.fate(me) {
             Fate::Sent | Fate::Open => return Doing::waiting(u64::MAX),
             Fate::Granted | Fate::Refused => {}
@@ -147,7 +151,7 @@ impl Follower {
     }
 }
 
-/// No schedule is in force, or the one in force has not come yet.
+/// No schedule is in force, or the one in force has not come yet or does not know this robot yet.
 fn without_schedule(now: &Now<'_>) -> Doing {
     waiting_for_planner(match now.snapshot.header.schedule_version {
         0 => now.counted().change,
@@ -189,14 +193,17 @@ fn put_downs(now: &Now<'_>, due: Due) -> u32 {
 }
 
 /// The object grasped next, and the turn for it: now, or by an action ahead.
-fn next_grasp(now: &Now<'_>, schedule: &Schedule, due: Option<Due>) -> Option<(usize, u32)> {
+fn next_grasp(
+    now: &Now<'_>,
+    (schedule, part): (&Schedule, &RobotSchedule),
+    due: Option<Due>,
+) -> Option<(usize, u32)> {
     if let Some(due) = due
         && due.grip == Grip::Grasp
     {
         return Some((due.object, due.turn));
     }
-    let first = schedule.robots[now.id].first;
-    let granted = now.me().actions.saturating_sub(first) as usize;
+    let granted = now.me().actions.saturating_sub(part.first) as usize;
     let mut ahead = schedule.actions_of(now.id).iter().skip(granted);
     let grasp = ahead.find(|action| action.grip == Grip::Grasp.code())?;
     Some((index(grasp.object)?, grasp.turn))

@@ -57,6 +57,11 @@ pub enum Change {
         /// A point that this wall alone covers.
         at: [f64; 2],
     },
+    /// There is one more robot. It gets the next number.
+    AddRobot {
+        /// Where its centre is: its home.
+        at: [f64; 2],
+    },
 }
 
 /// Why there is no such version of a scene.
@@ -120,6 +125,7 @@ impl Change {
                 }
                 draft.walls.retain(|wall| !covers(&wall));
             }
+            Self::AddRobot { at } => draft.homes.push(at),
         }
         Ok(())
     }
@@ -180,6 +186,10 @@ impl Change {
                 let at = point(at);
                 (ChangeKind::Open, SceneChange { at, ..goal(None) })
             }
+            Self::AddRobot { at } => {
+                let at = point(at);
+                (ChangeKind::AddRobot, SceneChange { at, ..goal(None) })
+            }
         };
         SceneChange {
             kind: kind.code(),
@@ -210,6 +220,9 @@ impl Change {
             ChangeKind::Open => Self::Open {
                 at: place(change.at),
             },
+            ChangeKind::AddRobot => Self::AddRobot {
+                at: place(change.at),
+            },
         })
     }
 }
@@ -233,6 +246,8 @@ fn covers(wall: &WallDraft, [x, y]: [f64; 2]) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use shm_types::capacity::MAX_ROBOTS;
+
     use super::*;
 
     const ROOM: &str = "name = \"room\"\n[robot]\nshape = { box = [0.5, 0.5] }\nspeed = 0.5\n\
@@ -271,6 +286,7 @@ mod tests {
                 corners: [3.0, 0.0, 3.2, 1.0],
             },
             Change::Open { at: [3.1, 2.0] },
+            Change::AddRobot { at: [5.0, 0.5] },
         ];
         let version = room().changed(&changes).unwrap();
         let text = crate::to_canonical_toml(&version);
@@ -281,6 +297,7 @@ mod tests {
         assert_eq!(version.objects[0].goal, None);
         assert_eq!(version.objects[1].goal, Some(Vec2::new(5.0, 2.0)));
         assert_eq!(version.objects[2].start, Vec2::new(1.0, 2.5));
+        assert_eq!(version.homes[1..], [Vec2::new(5.0, 0.5)]);
         assert_eq!(version.draft().walls.len(), 1);
         assert_eq!(
             version.draft().walls[0],
@@ -319,6 +336,7 @@ mod tests {
                 corners: [1.0, 2.0, 3.0, 4.0],
             },
             Change::Open { at: [1.0, 2.0] },
+            Change::AddRobot { at: [1.0, -2.0] },
         ];
         for change in changes {
             assert_eq!(Change::from_wire(&change.to_wire()), Some(change));
@@ -332,7 +350,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_is_told() {
-        let cases: [(Change, &str); 7] = [
+        let cases: [(Change, &str); 11] = [
             (
                 Change::Goal {
                     object: 2,
@@ -379,6 +397,22 @@ mod tests {
                 Change::Open { at: [2.9, 2.0] },
                 "0 walls cover the point 2.9, 2",
             ),
+            (
+                Change::AddRobot { at: [3.1, 2.0] },
+                "robots[1].home: the home lies in wall 0",
+            ),
+            (
+                Change::AddRobot { at: [5.9, 0.5] },
+                "robots[1].home: the home lies partly or wholly outside the bounds",
+            ),
+            (
+                Change::AddRobot { at: [0.9, 0.5] },
+                "are blocked by one another",
+            ),
+            (
+                Change::AddRobot { at: [5.0, 1.8] },
+                "overlap: the run could never be complete",
+            ),
         ];
         for (change, words) in cases {
             let error = room().changed(&[change]).unwrap_err().to_string();
@@ -391,5 +425,16 @@ mod tests {
             .changed(&[twice, Change::Open { at: [3.05, 1.5] }])
             .unwrap_err();
         assert!(error.to_string().starts_with("2 walls cover"), "{error}");
+        let homes = (0..24).flat_map(|x| (0..24).map(move |y| (x, y)));
+        let robots = homes.map(|(x, y)| Change::AddRobot {
+            at: [0.5 + f64::from(x), 5.5 + f64::from(y)],
+        });
+        let robots: Vec<Change> = robots.take(MAX_ROBOTS).collect();
+        let hall = ROOM.replace("6.0, 3.0]", "30.0, 30.0]");
+        let hall = crate::parse(&hall, "hall").unwrap();
+        hall.changed(&robots[1..]).unwrap();
+        let error = hall.changed(&robots).unwrap_err().to_string();
+        let words = format!("{} robots, over the capacity", MAX_ROBOTS + 1);
+        assert!(error.contains(&words), "{error}");
     }
 }

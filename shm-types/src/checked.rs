@@ -314,7 +314,8 @@ impl Validate for ConstraintTable {
 
 impl Validate for Schedule {
     fn validate(&self, counts: Counts) -> Result<(), Invalid> {
-        if self.robot_count != counts.robots {
+        // One that was made before a robot was added lists nothing for it.
+        if self.robot_count > counts.robots {
             return Err(Invalid::Inconsistent {
                 what: "the number of robots",
             });
@@ -411,7 +412,7 @@ impl Validate for ControlRequest {
                 ChangeKind::Goal | ChangeKind::Move | ChangeKind::Add => {
                     id("object", change.object, counts.objects)?;
                 }
-                ChangeKind::Close | ChangeKind::Open => {}
+                ChangeKind::Close | ChangeKind::Open | ChangeKind::AddRobot => {}
             }
         }
         Ok(())

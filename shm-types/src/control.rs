@@ -54,6 +54,8 @@ tag! {
         Close = 3,
         /// The wall at the point `at` is gone.
         Open = 4,
+        /// A new robot stands at `at`, its home.
+        AddRobot = 5,
     }
 }
 

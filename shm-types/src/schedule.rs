@@ -94,7 +94,7 @@ pub struct RobotSchedule {
 pub struct Schedule {
     /// Rises with each schedule; 0 is the empty one nobody publishes.
     pub version: u32,
-    /// Robots of the run.
+    /// Robots of the run when it was made.
     pub robot_count: u32,
     /// Live entries of `actions`.
     pub action_count: u32,
@@ -111,10 +111,17 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// The actions listed for a robot; none for one that does not exist.
+    /// The part that is a robot's; none for one that has come since.
+    #[must_use]
+    pub fn part(&self, robot: usize) -> Option<&RobotSchedule> {
+        let live = self.robots.get(..self.robot_count as usize)?;
+        live.get(robot)
+    }
+
+    /// The actions listed for a robot; none for one that it does not know.
     #[must_use]
     pub fn actions_of(&self, robot: usize) -> &[Action] {
-        let Some(part) = self.robots.get(robot) else {
+        let Some(part) = self.part(robot) else {
             return &[];
         };
         let from = part.offset as usize;
@@ -125,7 +132,7 @@ impl Schedule {
     /// A robot's action of this number, if it is listed.
     #[must_use]
     pub fn action(&self, robot: usize, number: u32) -> Option<&Action> {
-        let first = self.robots.get(robot)?.first;
+        let first = self.part(robot)?.first;
         self.actions_of(robot)
             .get(number.checked_sub(first)? as usize)
     }

@@ -211,7 +211,7 @@ fn schedule() -> Box<Schedule> {
 fn a_schedule_with_one_bad_value_is_refused() {
     type Plant = fn(&mut Schedule);
     let plants: [(Plant, &str); 16] = [
-        (|s| s.robot_count = 1, "other run"),
+        (|s| s.robot_count += 1, "a robot that is not there"),
         (|s| s.action_count = 16_385, "actions over capacity"),
         (|s| s.action_count = 2, "actions past the live ones"),
         (|s| s.wait_count = 65_537, "waits over capacity"),

@@ -371,8 +371,19 @@ impl<'s> Simulation<'s> {
             for robot in &mut self.robots {
                 robot.enter(&self.scene);
             }
+            self.add_robots();
         }
         self.world.snapshot_into(&mut self.snapshot);
+    }
+
+    /// Makes machines for robots that the scene has got.
+    fn add_robots(&mut self) {
+        for id in self.robots.len()..self.scene.homes.len() {
+            let settings = self.settings.clone();
+            (self.robots).push(Robot::new(&self.scene, settings, id, FIRST_INCARNATION));
+            self.commands.push(Command::default());
+            self.answers.push(None);
+        }
     }
 
     /// What the machines know now.

@@ -26,10 +26,10 @@ pub(crate) fn main(args: &RunArgs) -> Outcome {
     args.check()
         .map_err(|error| Failure::new(Exit::Usage, error))?;
     let Loaded { scene, seed } = scenario::load(&args.scenario, args.robots)?;
-    let options = RunOptions {
-        changes: changes_of(args)?,
-        ..options(args)
-    };
+    let changes = changes_of(args)?;
+    let mut options = options(args);
+    options.more_robots = options.more_robots.max(changes::more_robots(&changes));
+    options.changes = changes;
     let frame = RunResult {
         seed,
         ..frame(&scene, driver(args), &options)
@@ -80,6 +80,7 @@ fn options(args: &RunArgs) -> RunOptions {
         pin: args.process.pin,
         realtime_scheduling: args.process.realtime,
         monitors: args.process.monitors,
+        more_robots: args.process.more_robots,
         delays: args.process.delay.clone(),
         trace: args.trace.clone(),
         hashes: args.hashes.clone(),
@@ -167,6 +168,7 @@ pub(crate) fn complete(frame: RunResult, scene: &Scene, finished: Finished) -> R
     let bounds = Bounds::of(scene, BoundLimits::default()).filter(|_| is_same);
     RunResult {
         date: bench::machine::date_utc(),
+        robots: world.activities.len().max(frame.robots),
         outcome,
         reason,
         makespan_s: Some(seconds(world.time_ns)),

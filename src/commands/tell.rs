@@ -50,6 +50,7 @@ fn told(what: &What) -> Result<Told, String> {
             corners: [corners[0], corners[1], corners[2], corners[3]],
         }),
         What::Open { at } => change(Change::Open { at: place(at) }),
+        What::AddRobot { at } => change(Change::AddRobot { at: place(at) }),
         What::Lose { robot } => Ok(Told::Lose(*robot)),
         What::Back { robot } | What::Release { robot } => Ok(Told::Back(*robot)),
     }
@@ -94,6 +95,7 @@ fn words(what: &What) -> String {
         What::AddObject { .. } => "there is one more object".to_owned(),
         What::Close { .. } => "there is a wall".to_owned(),
         What::Open { .. } => "the wall is gone".to_owned(),
+        What::AddRobot { .. } => "there is one more robot".to_owned(),
         What::Lose { robot } => format!("robot {robot} takes part no more"),
         What::Release { robot } => format!("robot {robot} may move again"),
         What::Back { robot } => format!("robot {robot} takes part again"),

@@ -82,6 +82,8 @@ fn a_live_run_is_told_and_what_cannot_be_changes_nothing() {
             ),
             ("close 5 1 6 2", "objects[0].goal: the goal lies in wall 3"),
             ("open 1 1", "0 walls cover the point 1, 1"),
+            ("add-robot 3.1 2", "robots[2].home: the home lies in wall 1"),
+            ("add-robot 0.6 0.6", "are blocked by one another"),
             (
                 "lose 7",
                 "there is no robot 7: the run has 2, counted from 0",
@@ -120,6 +122,58 @@ fn a_live_run_is_told_and_what_cannot_be_changes_nothing() {
         assert_eq!(result["checker"]["complete"], true);
         assert_eq!(result["counts"]["scene_changes"], 2);
         assert_eq!(result["lower_bound_s"], Value::Null, "of another scene");
+    }
+}
+
+#[test]
+fn a_robot_joins_a_live_run() {
+    let place = place();
+    for more in [
+        &["--more-robots", "1"][..],
+        &[
+            "--more-robots",
+            "1",
+            "--method",
+            "grasping-and-restricted",
+            "--pin",
+        ],
+        &["--more-robots", "1", "--wait", "block"],
+        &[
+            "--more-robots",
+            "1",
+            "--clock",
+            "real",
+            "--rate",
+            "200",
+            "--speed",
+            "3",
+        ],
+    ] {
+        let run = Run::start(place.path(), more);
+        let told = tell(place.path(), "add-robot 2.0 0.4").assert().code(0);
+        says(&stdout(&told), &["there is one more robot, from tick "]);
+        let refused = tell(place.path(), "add-robot 4.2 0.4").assert().code(3);
+        says(
+            &stderr(&refused),
+            &["the run has room for 3 robots", "--more-robots"],
+        );
+        let result = run.finish();
+        assert_eq!(result["outcome"], "solved", "{result}");
+        assert_eq!(result["checker"]["violations"], 0);
+        assert_eq!(result["checker"]["complete"], true);
+        assert_eq!(result["robots"], 3);
+        let robots = result["times"]["per_robot"].as_array().unwrap();
+        assert_eq!(robots.len(), 3);
+        for robot in robots {
+            let times = robot.as_object().unwrap().values();
+            let sum: f64 = times.map(|time| time.as_f64().unwrap()).sum();
+            assert!((sum - result["makespan_s"].as_f64().unwrap()).abs() < 1e-6);
+        }
+        let roles = result["roles"].as_array().unwrap();
+        let added = roles.iter().find(|role| role["role"] == "robot-2").unwrap();
+        assert!(added["pid"].as_u64().unwrap() > 0);
+        let answered = added["ticks_answered"].as_u64().unwrap();
+        assert!(answered > 0 && answered < result["ticks"].as_u64().unwrap());
     }
 }
 

@@ -33,6 +33,8 @@ struct Finished {
     scene: Scene,
     /// Where objects stand at the end, m.
     objects: Vec<[f64; 2]>,
+    /// How many robots a viewer shows at the beginning, and at the end.
+    shown: [usize; 2],
 }
 
 /// Tells a run of something; false while a robot is in the way of it.
@@ -41,7 +43,7 @@ fn tell(simulation: &mut Simulation<'_>, what: &What) -> bool {
     let told = match what {
         What::Change(changes) => match simulation.change(changes) {
             Ok(told) => told,
-            Err(NotMade::Wall { by } | NotMade::Object { by, .. }) => {
+            Err(NotMade::Wall { by } | NotMade::Object { by, .. } | NotMade::Robot { by, .. }) => {
                 assert!(matches!(by, Blocked::Robot(_) | Blocked::Grant(_)), "{by}");
                 return false;
             }
@@ -94,6 +96,7 @@ fn run(scene: &Scene, method: Method, events: &[(u64, What)]) -> Finished {
     // What a viewer makes of it.
     let story = trace::Story::read(trace::Reader::new(trace.as_slice()).unwrap()).unwrap();
     assert!(trace::page(&story, 0.0).contains("versions"));
+    let shown = [0.0, story.until_s()].map(|time_s| trace::standing(&story, time_s).len());
     let scene = simulation.scene().clone();
     let states = &simulation.snapshot().objects[..scene.objects.len()];
     let objects = states
@@ -104,6 +107,7 @@ fn run(scene: &Scene, method: Method, events: &[(u64, What)]) -> Finished {
         report,
         scene,
         objects,
+        shown,
     }
 }
 
@@ -189,6 +193,46 @@ fn a_robot_that_is_lost_is_gone_around_and_may_come_back() {
     };
     assert_eq!(moved(0), 0);
     assert!(moved(1) > 0);
+}
+
+fn add_robot(at: [f64; 2]) -> What {
+    What::Change(vec![Change::AddRobot { at }])
+}
+
+#[test]
+fn a_robot_that_is_added_works_with_the_others() {
+    for method in [Method::Anytime, Method::GraspingAndRestricted, Method::All] {
+        for tick in TICKS {
+            let finished = solve(&rooms(), method, &[(tick, add_robot([2.0, 0.4]))]);
+            let report = &finished.report;
+            assert_eq!(report.robots.len(), 3);
+            assert_eq!(finished.shown, [if tick > 0 { 2 } else { 3 }, 3]);
+            for robot in &report.robots {
+                assert_eq!(robot.times.total(), report.ticks);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_robot_that_is_added_does_what_those_that_are_lost_would_have() {
+    for method in [Method::Anytime, Method::GraspingAndRestricted] {
+        let events = [
+            (0, What::Lose(0)),
+            (0, What::Lose(1)),
+            (200, add_robot([2.0, 0.4])),
+        ];
+        let finished = solve(&rooms(), method, &events);
+        let moved = finished.report.robots.iter().map(|robot| {
+            let ticks = robot.times.ticks(shm_types::Activity::Moving);
+            ticks > 0
+        });
+        assert_eq!(moved.collect::<Vec<_>>(), [false, false, true]);
+    }
+    // In one that was about to end: it stays at home.
+    let late = [(0, add_robot([2.0, 0.4])), (300, add_robot([4.2, 0.4]))];
+    let finished = solve(&rooms(), Method::Anytime, &late);
+    assert_eq!(finished.report.robots.len(), 4);
 }
 
 #[test]

@@ -100,6 +100,11 @@ impl<R: Read> Replay<R> {
                 let way = Way::standing(BodyKind::Object, id, object.start, 0);
                 self.objects.push(way);
             }
+            let robots = scene.homes.iter().enumerate();
+            for (id, home) in robots.skip(self.robots.len()) {
+                let way = Way::standing(BodyKind::Robot, id, *home, 0);
+                self.robots.push(way);
+            }
             self.starts = scene.objects.iter().map(|object| object.start).collect();
         }
         let mut motions = span.motions;

@@ -22,6 +22,13 @@ impl ActivityTimes {
         self.ticks[activity as usize]
     }
 
+    /// Of a robot that comes after so many ticks: it had nothing to do in them.
+    pub(crate) fn idle_for(ticks: u64) -> Self {
+        let mut times = Self::default();
+        times.ticks[Activity::Idle as usize] = ticks;
+        times
+    }
+
     /// All ticks so far.
     #[must_use]
     pub fn total(&self) -> u64 {

@@ -53,8 +53,15 @@ impl Bars {
         }
     }
 
-    /// Makes room for more of both: counts are by task, so there is nothing to move.
+    /// Makes room for more of both. Counts are by task: another robot moves those of each.
     pub(crate) fn make_room(&mut self, robots: usize, objects: usize) {
+        if robots > self.robots {
+            let rows = self.counts.chunks(self.robots);
+            let none = || std::iter::repeat_n(0, robots - self.robots);
+            let rows = rows.flat_map(|row| row.iter().copied().chain(none()));
+            self.counts = rows.collect();
+            self.robots = robots;
+        }
         self.counts.resize(robots * objects, 0);
         let more = (robots * objects).saturating_sub(self.parked.len());
         self.parked.reserve(more);

@@ -12,10 +12,12 @@
 
 use std::fmt;
 
-use scene::{Change, ChangeError, Scene, Vec2, overlap};
+use scene::{Change, ChangeError, ROBOT_ALONE, Scene, Vec2, overlap};
 use shm_types::{EventKind, Outcome};
 
+use crate::accounts::ActivityTimes;
 use crate::bodies::{Bodies, Sweep, Waiver};
+use crate::cleared::Cleared;
 use crate::journal::{Event, Journal};
 use crate::state::{Object, Robot};
 use crate::step::World;
@@ -70,6 +72,14 @@ pub enum NotMade {
         /// What it would be in the way of.
         by: Blocked,
     },
+    /// A robot cannot be there.
+    #[error("robot {robot} cannot be there: {by}")]
+    Robot {
+        /// Its number.
+        robot: usize,
+        /// What it would be in the way of.
+        by: Blocked,
+    },
     /// A wall cannot stand there.
     #[error("there can be no wall there: {by}")]
     Wall {
@@ -116,6 +126,10 @@ impl World {
         for &object in &put {
             self.find_room(&next.scene, &bodies, object)
                 .map_err(|by| NotMade::Object { object, by })?;
+        }
+        for robot in self.robots.len()..next.scene.homes.len() {
+            self.find_room_for_robot(&next.scene, &bodies, robot)
+                .map_err(|by| NotMade::Robot { robot, by })?;
         }
         if next.scene.draft().walls != scene.draft().walls {
             self.find_room_for_walls(&next.scene, &bodies)
@@ -170,6 +184,34 @@ impl World {
         Ok(())
     }
 
+    /// Whether a new robot can be at its home, empty-handed. That no wall and no other home is there
+    /// follows from its being a scene.
+    fn find_room_for_robot(
+        &self,
+        scene: &Scene,
+        bodies: &Bodies,
+        robot: usize,
+    ) -> Result<(), Blocked> {
+        let standing = Sweep::standing(ROBOT_ALONE, scene.homes[robot]);
+        let waiver = |object: usize| {
+            if scene.objects[object].pass_under {
+                Waiver::All
+            } else {
+                Waiver::None
+            }
+        };
+        if let Some(object) = bodies.object_met(scene, standing, true, waiver) {
+            return Err(Blocked::Object(object));
+        }
+        for (i, other) in self.robots.iter().enumerate() {
+            along_grant(scene, i, other, |sweep| {
+                bodies.sweeps_meet(scene, standing, true, sweep)
+                    || bodies.sweeps_meet(scene, sweep, true, standing)
+            })?;
+        }
+        Ok(())
+    }
+
     /// Whether the walls of `scene` leave room for what stands on the ground, and for robots where
     /// they are and where they may go.
     fn find_room_for_walls(&self, scene: &Scene, bodies: &Bodies) -> Result<(), Blocked> {
@@ -203,6 +245,15 @@ impl World {
         for spec in &scene.objects[self.objects.len()..] {
             self.objects.push(Object::at_start(spec.start, spec.goal));
         }
+        for &home in &scene.homes[self.robots.len()..] {
+            self.robots.push(Robot {
+                times: ActivityTimes::idle_for(self.tick),
+                ..Robot::at_home(home)
+            });
+        }
+        // What was clear in one version may not be in another.
+        self.cleared = vec![Cleared::nothing(); self.robots.len()];
+        self.grants.make_room(self.robots.len());
         self.bars.make_room(self.robots.len(), self.objects.len());
         for (object, spec) in self.objects.iter_mut().zip(&scene.objects) {
             object.goal = spec.goal;
@@ -250,6 +301,7 @@ mod tests {
     use shm_types::{EventKind, Point, TaskStatus};
 
     use super::*;
+    use crate::control::FIRST_INCARNATION;
     use crate::testing::{BELOW, Bench, papers, room};
 
     /// Object 0 above robot 0, object 1 in a corner; robot 1 at the other end of the room.
@@ -288,6 +340,10 @@ mod tests {
             goal: Some([6.0, 5.0]),
             like: 0,
         }
+    }
+
+    fn add_robot(at: [f64; 2]) -> Change {
+        Change::AddRobot { at }
     }
 
     fn close(x0: f64, y0: f64, x1: f64, y1: f64) -> Change {
@@ -440,6 +496,67 @@ mod tests {
         assert_eq!(bench.events(EventKind::Unclaimed)[0].robot, 1);
         assert_eq!(bench.robot(1).grant_count, 0);
         assert_eq!(bench.header().epoch, epoch + 1);
+    }
+
+    #[test]
+    fn a_robot_that_is_added_is_at_home_and_takes_part_from_the_next_snapshot_on() {
+        let mut bench = bench(ahead());
+        bench.steps(3);
+        make(&mut bench, &[add_robot([5.0, 1.0])]);
+        assert_eq!(bench.header().robot_count, 3);
+        let robot = bench.robot(2);
+        assert_eq!(robot.position, Point::new(5.0, 1.0));
+        assert_eq!((robot.live, robot.incarnation), (1, FIRST_INCARNATION));
+        assert_eq!(bench.world.times(2).total(), 4, "before, it was idle");
+        bench.ask(2, &[[5.0, 4.0]]);
+        bench.steps(900);
+        assert_eq!(bench.at(2), [5.0, 4.0]);
+        // Others keep off it.
+        bench.ask(1, &[[6.5, 1.0], [6.5, 4.0], [1.0, 4.0]]);
+        bench.steps(1_400);
+        assert!((5.5..5.52).contains(&bench.at(1)[0]), "{:?}", bench.at(1));
+    }
+
+    #[test]
+    fn no_robot_comes_where_something_is_or_may_go() {
+        let mut bench = bench(ahead());
+        bench.ask(1, &[[4.0, 1.0]]);
+        bench.step();
+        let robot = |by| NotMade::Robot { robot: 2, by };
+        let cases = [
+            ([8.0, 2.6], robot(Blocked::Object(1))),
+            ([6.0, 1.4], robot(Blocked::Grant(1))),
+        ];
+        for (at, expected) in cases {
+            assert_eq!(refusal(&bench, add_robot(at)), expected, "{at:?}");
+        }
+        // Its home is another one's, or it would stand in a wall: there is no such scene.
+        for at in [[1.2, 1.0], [0.1, 3.0], [5.0, 5.2]] {
+            let refused = refusal(&bench, add_robot(at));
+            assert!(matches!(refused, NotMade::Scene(_)), "{refused}");
+        }
+        // Touching is not overlapping.
+        for fine in [[6.0, 1.5], [7.55, 3.0]] {
+            bench
+                .world
+                .prepare(&bench.scene, &[add_robot(fine)])
+                .unwrap();
+        }
+        bench.steps(900);
+        let where_it_went = robot(Blocked::Robot(1));
+        assert_eq!(refusal(&bench, add_robot([4.4, 1.0])), where_it_went);
+        assert_eq!(bench.header().robot_count, 2, "and nothing has changed");
+    }
+
+    #[test]
+    fn what_a_robot_is_barred_from_does_not_become_another_ones() {
+        let mut bench = bench(papers());
+        bench.fail(1, 1, shm_types::FailureCause::Robots, 0);
+        bench.step();
+        let counts = bench.world.bars.counts().to_vec();
+        assert_eq!(counts, [0, 0, 0, 1], "by task, then by robot");
+        bench.world.bars.make_room(3, 3);
+        assert_eq!(bench.world.bars.counts(), [0, 0, 0, 0, 1, 0, 0, 0, 0]);
     }
 
     #[test]

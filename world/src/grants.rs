@@ -65,6 +65,11 @@ impl Grants {
         }
     }
 
+    /// Makes room for more robots.
+    pub(crate) fn make_room(&mut self, robots: usize) {
+        *self = Self::new(robots, self.tick_m);
+    }
+
     /// Grants what can be granted at `tick`, and sets every robot's track for its motion.
     /// Returns how many requests were refused for the first time.
     pub(crate) fn extend(

@@ -108,7 +108,8 @@ impl World {
         let Some((why, robot)) = misfit else {
             self.schedules.in_force = version;
             for (i, robot) in self.robots.iter_mut().enumerate() {
-                if schedule.is_some_and(|schedule| schedule.robots[i].count == 0) {
+                let part = schedule.and_then(|schedule| schedule.get().part(i));
+                if part.is_none_or(|part| part.count == 0) {
                     robot.keep_path();
                 } else {
                     robot.keep_whole_actions();
@@ -137,10 +138,11 @@ impl World {
 
 /// Why a schedule does not go on where robot `i`'s grant ends: a gap after what is granted, or
 /// what it lists of that leads elsewhere than it was granted to. One that lists nothing stops the
-/// robot where its grant ends, be it between the ends of actions.
+/// robot where its grant ends, be it between the ends of actions, and so does one that does not
+/// know it yet.
 fn misfit(schedule: &Schedule, i: usize, robot: &Robot) -> Option<Refusal> {
     let granted = robot.granted_actions();
-    let part = &schedule.robots[i];
+    let part = schedule.part(i)?;
     if part.count == 0 {
         return (part.first > granted).then_some(Refusal::Gap);
     }

@@ -284,6 +284,12 @@ impl World {
         self.tick
     }
 
+    /// How many robots there are.
+    #[must_use]
+    pub const fn robots(&self) -> usize {
+        self.robots.len()
+    }
+
     /// How the run stands.
     #[must_use]
     pub const fn outcome(&self) -> Outcome {
@@ -317,7 +323,8 @@ impl World {
         &self.counters
     }
 
-    /// Ticks of `robot` by activity (rule 24); they sum up to the ticks so far.
+    /// Ticks of `robot` by activity (rule 24); they sum up to the ticks so far. Those before it was
+    /// added count as idle.
     ///
     /// # Panics
     /// When there is no such robot.

@@ -145,6 +145,9 @@ impl Bench {
         self.control.clear();
         if let Some(next) = self.change.take() {
             self.scene = next.scene;
+            let added = self.commands.len() as u32..self.scene.counts().robots;
+            self.commands.extend(added.map(command));
+            self.silent.resize(self.commands.len(), false);
         }
         self.world.snapshot_into(&mut self.snapshot);
         let tick = self.snapshot.header.tick;

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use scene::Scene;
 use serde::{Deserialize, Serialize};
 use shm_types::Counts;
-use shm_types::capacity::LAYOUT_VERSION;
+use shm_types::capacity::{LAYOUT_VERSION, MAX_OBJECTS};
 
 use crate::domain::{DomainError, RUN_FILE, SCENARIO_FILE, file_error, put};
 use crate::options::{Recovery, Role, RunOptions};
@@ -31,9 +31,11 @@ pub struct RunFile {
     pub scenario: String,
     /// Hash of the canonical scenario.
     pub scenario_hash: u64,
-    /// Robots.
+    /// Robots, as far as the supervisor has seen: some may be added on the way.
     pub robots: u32,
-    /// Objects.
+    /// Robots that there is room for in shared memory.
+    pub most_robots: u32,
+    /// Objects that it began with.
     pub objects: u32,
     /// Bytes of shared memory that all segments can come to hold.
     pub shared_memory_bytes: u64,
@@ -67,12 +69,12 @@ impl RunFile {
         u64::from_str_radix(&self.id, 16).unwrap_or(0)
     }
 
-    /// Robots and objects.
+    /// What it can come to have, and its shared memory has room for.
     #[must_use]
-    pub const fn counts(&self) -> Counts {
+    pub const fn room(&self) -> Counts {
         Counts {
-            robots: self.robots,
-            objects: self.objects,
+            robots: self.most_robots,
+            objects: MAX_OBJECTS as u32,
         }
     }
 

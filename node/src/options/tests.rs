@@ -62,7 +62,7 @@ fn numbers_out_of_range_are_refused() {
         assert!(matches!(refused, Err(OptionError::Range { .. })));
     }
     let delay = Delay {
-        role: Role::Robot(4),
+        role: Role::Robot(COUNTS.robots + DEFAULT_MORE_ROBOTS),
         ms: 1,
         ticks: 1,
     };

@@ -88,11 +88,16 @@ impl Follower {
 
     /// The next snapshot, once it is time for it; `None` once the run is over or this process is
     /// to end. The sample before it must have been dropped. Ticks never go back; one comes again
-    /// only from a world that was started again, and is then to be answered as before.
+    /// only from a world that was started again, and is then to be answered as before. While it
+    /// waits in lockstep, `meanwhile` is done again and again.
     ///
     /// # Errors
     /// Shared memory failed.
-    pub(crate) fn next(&mut self, seat: &mut Seat) -> Result<Option<Next>, RoleError> {
+    pub(crate) fn next(
+        &mut self,
+        seat: &mut Seat,
+        meanwhile: impl Fn() -> Result<(), RoleError>,
+    ) -> Result<Option<Next>, RoleError> {
         if let Some(ticker) = &mut self.ticker {
             if !seat.is_warm() {
                 ticker.forget_misses();
@@ -105,7 +110,10 @@ impl Follower {
                     Some(ticker) => {
                         ticker.wait();
                     }
-                    None => self.waiter.pause()?,
+                    None => {
+                        meanwhile()?;
+                        self.waiter.pause()?;
+                    }
                 }
                 continue;
             };

@@ -129,7 +129,7 @@ impl Seat {
             incarnation,
             node: ports::join(&run.root, &run.prefix, &role.to_string())?,
             topics: Topics::of(
-                run.counts(),
+                run.room(),
                 run.options.settings.method,
                 run.options.monitors,
             ),

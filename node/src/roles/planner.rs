@@ -33,7 +33,7 @@ pub fn main(run_dir: &Path, incarnation: u32) -> Result<(), RoleError> {
     let mut shell = Shell::new(&seat)?;
     let mut follower = Follower::new(&seat, robots, robots + 1)?;
     seat.settle();
-    while let Some(next) = follower.next(&mut seat)? {
+    while let Some(next) = follower.next(&mut seat, || shell.connect())? {
         let Next::Snapshot(snapshot) = next else {
             shell.connect()?;
             shell.send()?;
@@ -80,7 +80,7 @@ impl Shell {
     fn new(seat: &Seat) -> Result<Self, RoleError> {
         let (topics, node) = (&seat.topics, &seat.node);
         let schedules = topics.schedule_service(node, Access::Open)?;
-        let most = seat.run.robots as usize * (OPEN_CALLS + 1);
+        let most = seat.run.room().robots as usize * (OPEN_CALLS + 1);
         Ok(Self {
             planner: Planner::succeeding(
                 &seat.scene,

@@ -11,10 +11,11 @@ mod questions;
 mod timing;
 
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use crate::clock;
 use crate::histograms::Timed;
-use crate::options::Role;
+use crate::options::{Clock, Role};
 use crate::ports::{Access, Publisher};
 use crate::roles::follower::{Follower, Next};
 use crate::roles::tables::Tables;
@@ -24,6 +25,11 @@ use questions::Questions;
 use robot::{Robot, RobotInput};
 use shm_types::{Checked, Command, ConstraintTable, Schedule, SnapshotHeader, WorldSnapshot};
 use timing::Timing;
+
+/// How long after its start a robot waits to be let in by a planner, which may be dead.
+const LET_IN: Duration = Duration::from_secs(2);
+/// Sleep between two looks.
+const LOOK_AGAIN: Duration = Duration::from_micros(200);
 
 /// Takes part in the run in `run_dir` as process `incarnation` of robot `index` until it ends.
 ///
@@ -38,12 +44,16 @@ pub fn main(run_dir: &Path, index: u32, incarnation: u32) -> Result<(), RoleErro
     let mut shell = Shell::new(&seat, index)?;
     let mut follower = Follower::new(&seat, index, robots + 1)?;
     seat.settle();
-    while let Some(next) = follower.next(&mut seat)? {
+    while let Some(next) = follower.next(&mut seat, || Ok(()))? {
         let Next::Snapshot(snapshot) = next else {
             shell.send()?;
             continue;
         };
         let received_ns = clock::now_ns();
+        if index >= snapshot.header.robot_count {
+            // A world that goes on from before this robot was added knows nothing of it.
+            continue;
+        }
         shell.follow(&mut seat, &snapshot.header)?;
         let snapshot = Checked::new(&*snapshot, seat.counts()).map_err(refused("world"))?;
         seat.record_since(Timed::SnapshotCheck, received_ns);
@@ -61,7 +71,8 @@ pub fn main(run_dir: &Path, index: u32, incarnation: u32) -> Result<(), RoleErro
 /// A robot and its ports.
 struct Shell {
     index: usize,
-    robot: Robot,
+    /// Once it has seen a snapshot: the scene may have got this robot since the run began.
+    robot: Option<Robot>,
     tables: Tables<ConstraintTable>,
     /// The table of version 0.
     empty: Box<ConstraintTable>,
@@ -71,18 +82,19 @@ struct Shell {
     waker: Option<Waker>,
     command: Box<Command>,
     timing: Timing,
+    /// When it began to wait to be let in.
+    since: Instant,
 }
 
 impl Shell {
     fn new(seat: &Seat, index: u32) -> Result<Self, RoleError> {
         let (topics, node) = (&seat.topics, &seat.node);
         let index = index as usize;
-        let settings = seat.options().settings.clone();
         let schedules = topics.schedule_service(node, Access::Open)?;
         let schedules = schedules.map(|service| Tables::new(&service, seat.counts()));
         Ok(Self {
             index,
-            robot: Robot::new(&seat.scene, settings, index, seat.incarnation),
+            robot: None,
             tables: Tables::new(
                 &topics.constraints.service(node, Access::Open)?,
                 seat.counts(),
@@ -94,19 +106,51 @@ impl Shell {
             waker: seat.waker(|| topics.wake_world.service(node, Access::Open)?.waker())?,
             command: Box::default(),
             timing: Timing::default(),
+            since: Instant::now(),
         })
     }
 
     /// Takes over the version of the scene that a snapshot names.
     fn follow(&mut self, seat: &mut Seat, header: &SnapshotHeader) -> Result<(), RoleError> {
-        if seat.follow(header)? {
-            self.robot.enter(&seat.scene);
+        let is_other = seat.follow(header)?;
+        match &mut self.robot {
+            Some(robot) if is_other => robot.enter(&seat.scene),
+            Some(_) => {}
+            None => {
+                let settings = seat.options().settings.clone();
+                let (scene, incarnation) = (&seat.scene, seat.incarnation);
+                self.robot = Some(Robot::new(scene, settings, self.index, incarnation));
+            }
+        }
+        if is_other {
             self.tables.recount(seat.counts());
             if let Some(schedules) = &mut self.schedules {
                 schedules.recount(seat.counts());
             }
         }
         Ok(())
+    }
+
+    /// Takes in what the planner has published. In lockstep, one that has come later waits to be let
+    /// in: what it does may not depend on when that is. The planner does so while it waits, too.
+    fn receive(&mut self, seat: &Seat, header: &SnapshotHeader) -> Result<(), RoleError> {
+        loop {
+            self.tables.receive(header.epoch_constraints_version)?;
+            if let Some(schedules) = &mut self.schedules {
+                schedules.receive(header.schedule_version)?;
+            }
+            let lacks_table = header.constraints_version > 0 && self.tables.newest().is_none();
+            let schedules = self.schedules.as_ref();
+            let lacks_schedule = header.schedule_version > 0
+                && schedules.is_some_and(|schedules| schedules.newest().is_none());
+            let may_wait = seat.options().clock == Clock::Lockstep
+                && self.since.elapsed() < LET_IN
+                && !seat.is_stopped();
+            if !(may_wait && (lacks_table || lacks_schedule)) {
+                return Ok(());
+            }
+            std::thread::sleep(LOOK_AGAIN);
+        }
     }
 
     /// One tick: from a snapshot to a command.
@@ -116,10 +160,10 @@ impl Shell {
         snapshot: Checked<'_, WorldSnapshot>,
     ) -> Result<(), RoleError> {
         let header = &snapshot.header;
-        self.tables.receive(header.epoch_constraints_version)?;
-        if let Some(schedules) = &mut self.schedules {
-            schedules.receive(header.schedule_version)?;
-        }
+        self.receive(seat, header)?;
+        let Some(robot) = &mut self.robot else {
+            return Ok(());
+        };
         self.questions.receive(seat, header.tick)?;
         self.timing
             .see(&snapshot.robots()[self.index], &mut seat.latencies);
@@ -139,9 +183,7 @@ impl Shell {
         };
         let units = seat.options().settings.units_per_tick(header.busy);
         let started_ns = clock::now_ns();
-        let asked = self
-            .robot
-            .step(&seat.scene, input, units, &mut self.command);
+        let asked = robot.step(&seat.scene, input, units, &mut self.command);
         self.timing
             .stepped(started_ns, &self.command, &mut seat.latencies);
         seat.answering();

@@ -69,7 +69,7 @@ pub fn main(run_dir: &Path, incarnation: u32) -> Result<(), RoleError> {
 /// Opens the journal; the states that a world process before this one has left, newest first.
 fn open_journal(seat: &Seat) -> Result<(Journal, Vec<Found>), RoleError> {
     let path = seat.journal_path();
-    let rooms = outbox::rooms_for(seat.scene.counts(), &seat.options().settings);
+    let rooms = outbox::rooms_for(seat.run.room(), &seat.options().settings);
     Journal::open(&path, seat.run.id_number(), &rooms).map_err(|error| RoleError::File {
         path,
         reason: error.to_string(),
@@ -267,7 +267,7 @@ impl Shell {
         let mut commands = [None; MAX_ROBOTS];
         self.ears.commands(&mut commands)?;
         let input = WorldInput {
-            commands: &commands[..seat.run.robots as usize],
+            commands: &commands[..self.world.robots()],
             planner: self.ears.report()?,
             table: self.ears.table()?,
             schedule: self.ears.schedule(),
@@ -278,7 +278,7 @@ impl Shell {
         self.tick += 1;
         if let Some(next) = change {
             seat.scene = next.scene;
-            self.ears.recount(seat.counts());
+            self.ears.recount(seat.counts(), &self.world);
         }
         seat.record_since(Timed::WorldStep, started_ns);
         if let Some(hashes) = &mut self.hashes {
@@ -336,7 +336,7 @@ impl Shell {
     fn report(&self, seat: &Seat) -> WorldReport {
         let world = &self.world;
         let counters = world.counters();
-        let activities = (0..seat.run.robots as usize).map(|robot| {
+        let activities = (0..world.robots()).map(|robot| {
             let mut report = ActivityReport::default();
             for activity in Activity::ALL {
                 *report.of_mut(*activity) = world.times(robot).ticks(*activity);

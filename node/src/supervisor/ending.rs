@@ -51,6 +51,7 @@ impl Run<'_> {
             notes.push(format!("{} half-made files removed", self.cleared));
         }
         notes.extend(joined_notes(&roles));
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let makers = roles.iter().find(|role| role.role == Role::World);
         let (lost_commands, wall_s) = makers.map_or((0, 0.0), |world| (world.lost, world.wall_s));
         let (trace, kept) = self.keep_trace();
@@ -66,7 +67,7 @@ impl Run<'_> {
             lost_commands,
             restarts: self.restarts,
             wall_s,
-            oversubscribed: self.oversubscribed,
+            oversubscribed: self.members.len() > cores,
             trace,
             notes,
             world,

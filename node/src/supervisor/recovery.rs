@@ -146,6 +146,7 @@ impl Run<'_> {
     /// Notices who has answered, died or fallen silent, and starts who is due. The end, if one is
     /// lost without whom the run cannot go on.
     pub(super) fn recover(&mut self) -> Result<Option<End>, RunError> {
+        self.welcome()?;
         self.greet();
         if let Some(end) = self.bury()? {
             return Ok(Some(end));
@@ -159,6 +160,19 @@ impl Run<'_> {
             self.diary.note(Happened::Cleared { files });
         }
         Ok(None)
+    }
+
+    /// Robots that were added get a process.
+    fn welcome(&mut self) -> Result<(), RunError> {
+        let robots = self.watch.header().map_or(0, |header| header.robot_count);
+        if robots <= self.file.robots {
+            return Ok(());
+        }
+        for index in self.file.robots..robots {
+            self.enlist(Role::Robot(index));
+        }
+        self.file.robots = robots;
+        Ok(self.directory.write_run(&self.file)?)
     }
 
     /// Who has answered a first tick is ready.

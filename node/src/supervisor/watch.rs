@@ -50,13 +50,6 @@ pub(super) struct Watch {
 impl Watch {
     pub(super) fn new(topics: &HeldTopics, run: &RunFile) -> Result<Self, TopicError> {
         let blocks = run.options.clock == Clock::Lockstep && run.options.wait == Wait::Block;
-        let pulses = Role::all(run.robots).map(|role| Pulse {
-            role,
-            incarnation: 0,
-            ready: false,
-            beat: 0,
-            heard: Instant::now(),
-        });
         let control = topics.control.client()?;
         // Whatever is asked for is asked again until it is seen to be so.
         control.hurry();
@@ -71,8 +64,19 @@ impl Watch {
             waker: blocks.then(|| topics.wake_world.waker()).transpose()?,
             newest: None,
             ticked: Instant::now(),
-            pulses: pulses.collect(),
+            pulses: Vec::new(),
         })
+    }
+
+    /// Listens to one more participant.
+    pub(super) fn add(&mut self, role: Role) {
+        self.pulses.push(Pulse {
+            role,
+            incarnation: 0,
+            ready: false,
+            beat: 0,
+            heard: Instant::now(),
+        });
     }
 
     /// Takes in what has come.

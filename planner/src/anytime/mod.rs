@@ -219,7 +219,9 @@ impl Anytime {
         let is_short = |(state, listed): (&RobotState, &RobotSchedule)| {
             listed.complete == 0 && state.actions >= listed.first + listed.count / 2
         };
-        let is_due = robots.iter().zip(&out.robots).any(is_short);
+        // A robot that has come since is in no list.
+        let listed = &out.robots[..out.robot_count as usize];
+        let is_due = robots.iter().zip(listed).any(is_short);
         if is_due {
             script.write(|robot| robots[robot].actions, out);
         }

@@ -352,7 +352,7 @@ impl Bench {
         };
         request.change_count = u32::from(request.kind == 5) * (tape.below(3) as u32 + 1);
         for change in &mut request.changes[..request.change_count as usize] {
-            (change.kind, change.object) = (tape.below(5) as u32, tape.below(8) as u32);
+            (change.kind, change.object) = (tape.below(6) as u32, tape.below(8) as u32);
             change.at.x = tape.below(500) as f64 * 0.01;
             change.at.y = tape.below(500) as f64 * 0.01;
             (change.to.x, change.to.y) = (change.at.x + 0.3, change.at.y + 0.2);
@@ -491,7 +491,10 @@ fn changes(request: &ControlRequest) -> Vec<Change> {
             3 => Change::Close {
                 corners: [change.at.x, change.at.y, change.to.x, change.to.y],
             },
-            _ => Change::Open {
+            4 => Change::Open {
+                at: place(change.at),
+            },
+            _ => Change::AddRobot {
                 at: place(change.at),
             },
         }

@@ -61,8 +61,9 @@ const objectAt = (i, t) => placeAt(data.objects[i].track, data.things[i].start, 
 /** Walls and goals as they are at a time: the scene may change. */
 const versionAt = (t) => entryAt(data.versions, t)[1];
 const goalAt = (i, t) => versionAt(t).goals[i] ?? null;
-/** Objects may come later. */
+/** Objects and robots may come later. */
 const isThere = (i, t) => t >= data.objects[i].since;
+const hasRobot = (i, t) => t >= data.robots[i].since;
 
 /** Closing and opening a grip look alike. */
 const kindOf = (phase) => (phase === "grasping" || phase === "releasing" ? "gripping" : phase);
@@ -321,7 +322,7 @@ function drawPlaces(t) {
   ctx.setLineDash([2, 3]);
   ctx.strokeStyle = colours.home;
   ctx.beginPath();
-  for (const home of data.homes) outline(data.robot, home, 1);
+  data.homes.forEach((home, i) => { if (hasRobot(i, t)) outline(data.robot, home, 1); });
   ctx.stroke();
   ctx.setLineDash([5, 4]);
   ctx.lineWidth = 1.75;
@@ -389,6 +390,7 @@ function drawObjects(t) {
 
 function drawRobots(t, carried) {
   for (let i = 0; i < data.robots.length; i++) {
+    if (!hasRobot(i, t)) continue;
     const at = robotAt(i, t), doing = robotDoing(i, t);
     const held = carried.get(i);
     const lifted = held !== undefined && overlaps(at, objectAt(held, t), held);
@@ -562,7 +564,7 @@ function showPanels(t) {
     const doing = robotDoing(i, t);
     robotDots[i].dot.style.background = colours[doing.kind];
     const what = doing.phase === "transfer" && doing.holding != null ? `carries ${doing.holding}` : PHASES[doing.phase];
-    setText(robotDots[i].words, ACTIVITIES[doing.activity] ? `${what}, ${ACTIVITIES[doing.activity]}` : what);
+    setText(robotDots[i].words, !hasRobot(i, t) ? "not there yet" : ACTIVITIES[doing.activity] ? `${what}, ${ACTIVITIES[doing.activity]}` : what);
     setText(robotRows[i][1], doing.task == null ? "–" : String(doing.task));
     setText(robotRows[i][2], waitsFor(doing));
   });
@@ -794,7 +796,7 @@ window.replay = {
   seek: (time_s) => seek(time_s * 1e9),
   time: () => state.t / 1e9,
   playing: () => state.playing,
-  robots: () => data.robots.map((_, i) => ({ at: robotAt(i, state.t), ...robotDoing(i, state.t), grant: grantAt(i, state.t) })),
+  robots: () => data.robots.map((_, i) => ({ there: hasRobot(i, state.t), at: robotAt(i, state.t), ...robotDoing(i, state.t), grant: grantAt(i, state.t) })),
   objects: () => data.things.map((_, i) => ({ at: objectAt(i, state.t), ...taskDoing(i, state.t) })),
   unmet: () => unmetAt(state.t),
 };

@@ -74,6 +74,7 @@ fn data(story: &Story, at_s: f64) -> Value {
     let waits = waits::waits(story);
     let robots = story.robots.iter().zip(&waits).map(|(robot, waits)| {
         json!({
+            "since": robot.since_ns,
             "waits": timeline(waits, |blocker| json!(blocker.map(|blocker| match blocker {
                 Blocker::Robot(id) => ("robot", id),
                 Blocker::Object(id) => ("object", id),

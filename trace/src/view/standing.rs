@@ -69,7 +69,7 @@ pub enum Cause {
     Gone,
 }
 
-/// How each robot is at a time.
+/// How each robot that is there by then is at a time.
 #[must_use]
 pub fn standing(story: &Story, time_s: f64) -> Vec<Standing> {
     #[expect(
@@ -81,6 +81,7 @@ pub fn standing(story: &Story, time_s: f64) -> Vec<Standing> {
     let waits = waits(story);
     let plans_ahead = story.scene.settings["method"] == "anytime";
     (0..story.robots.len())
+        .filter(|&robot| story.has_robot(robot, time_ns))
         .map(|robot| {
             let doing = entry_at(&story.robots[robot].doing, time_ns);
             let blocker = entry_at(&waits[robot], time_ns).copied().flatten();

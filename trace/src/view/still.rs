@@ -252,7 +252,7 @@ fn bodies(story: &Story, canvas: &Canvas, at_ns: u64) -> Group {
         group = with(group, canvas.number(id, at, &object.shape, ""));
     }
     let shape = &story.scene.robot.shape;
-    for id in 0..story.scene.homes.len() {
+    for id in (0..story.robots.len()).filter(|&id| story.has_robot(id, at_ns)) {
         let at = story.robot_at(id, at_ns);
         let body = Group::new().set("class", colour(id));
         group = group.add(body.add(canvas.shape(shape, at, "robot")));

@@ -39,6 +39,8 @@ pub(crate) type Timeline<T> = Vec<(u64, T)>;
 /// A robot over the whole run.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct RobotStory {
+    /// When it came, ns.
+    pub(crate) since_ns: u64,
     pub(crate) track: Vec<Motion>,
     pub(crate) doing: Timeline<RobotDoing>,
     /// Corners of the granted path ahead.
@@ -159,6 +161,11 @@ impl Story {
         place_at(&self.robots[robot].track, self.scene.homes[robot], time_ns)
     }
 
+    /// Whether a robot is there yet.
+    pub(crate) fn has_robot(&self, robot: usize, time_ns: u64) -> bool {
+        self.robots[robot].since_ns <= time_ns
+    }
+
     /// Where an object is, m.
     pub(crate) fn object_at(&self, object: usize, time_ns: u64) -> Place {
         let object = &self.objects[object];
@@ -168,6 +175,11 @@ impl Story {
     /// Another version of the scene holds from now on.
     fn change(&mut self, scene: SceneRecord) {
         let now_ns = self.until_ns;
+        let since_now = || RobotStory {
+            since_ns: now_ns,
+            ..RobotStory::default()
+        };
+        self.robots.resize_with(scene.homes.len(), since_now);
         for object in &scene.objects[self.objects.len()..] {
             self.objects.push(ObjectStory::of(object, now_ns));
         }

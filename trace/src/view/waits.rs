@@ -151,7 +151,8 @@ impl Room<'_> {
     fn others(&self, id: usize, now: &RobotDoing, time_ns: u64) -> Vec<(Blocker, Part<'_>)> {
         let story = self.story;
         let mut others = Vec::new();
-        for (other, robot) in story.robots.iter().enumerate().filter(|(o, _)| *o != id) {
+        let there = |other: usize| other != id && story.has_robot(other, time_ns);
+        for (other, robot) in story.robots.iter().enumerate().filter(|(o, _)| there(*o)) {
             let holding = entry_at(&robot.doing, time_ns).and_then(|doing| doing.holding);
             let at = story.robot_at(other, time_ns);
             let granted = entry_at(&robot.grants, time_ns).map_or(&[][..], Vec::as_slice);

@@ -56,6 +56,12 @@ impl Changes {
         let next = world
             .prepare(&seat.scene, changes)
             .map_err(|reason| reason.to_string())?;
+        let most = seat.run.room().robots as usize;
+        if next.scene.homes.len() > most {
+            return Err(format!(
+                "the run has room for {most} robots; start it with more --more-robots"
+            ));
+        }
         seat.write_version(&next.scene)
             .map_err(|error| error.to_string())?;
         self.next = Some(next);

@@ -64,11 +64,7 @@ impl Ears {
         let schedules = topics.schedule_service(node, Access::Open)?;
         let schedules = schedules.map(|service| Tables::new(&service, seat.counts()));
         let constraints = topics.constraints.service(node, Access::Open)?;
-        let robots = (0..seat.run.robots as usize).map(|robot| Robot {
-            incarnation: world.incarnation(robot),
-            ..Robot::default()
-        });
-        Ok(Self {
+        let mut ears = Self {
             counts: seat.counts(),
             commands: topics.command.service(node, Access::Open)?.subscriber()?,
             planner: topics.planner.service(node, Access::Open)?.subscriber()?,
@@ -76,13 +72,25 @@ impl Ears {
             control: topics.control.service(node, Access::Open)?.server()?,
             tables: Tables::new(&constraints, seat.counts())?,
             schedules: schedules.transpose()?,
-            robots: robots.collect(),
+            robots: Vec::with_capacity(seat.run.room().robots as usize),
             report: None,
             recorded: None,
             requests: Vec::with_capacity(MOST_REQUESTS),
             replies: Vec::with_capacity(MOST_REQUESTS),
             lost_commands: 0,
-        })
+        };
+        ears.know_robots(world);
+        Ok(ears)
+    }
+
+    /// Listens to all robots there are.
+    fn know_robots(&mut self, world: &World) {
+        for robot in self.robots.len()..world.robots() {
+            self.robots.push(Robot {
+                incarnation: world.incarnation(robot),
+                ..Robot::default()
+            });
+        }
     }
 
     /// Takes in all that has come.
@@ -230,8 +238,9 @@ impl Ears {
     }
 
     /// Another version of the scene is in force.
-    pub(super) fn recount(&mut self, counts: Counts) {
+    pub(super) fn recount(&mut self, counts: Counts, world: &World) {
         self.counts = counts;
+        self.know_robots(world);
         self.tables.recount(counts);
         if let Some(schedules) = &mut self.schedules {
             schedules.recount(counts);
