@@ -13,8 +13,12 @@
 //! - R ([`Yardstick`]) holds for plans that move each object **once**. Others may be faster. It is
 //!   a yardstick, not a bound.
 //!
+//! - Where an object has several grasps, or a goal can be filled by any of a kind, both are the
+//!   least over what can be chosen (`choices`).
+//!
 //! Source: rule 32; (b)'s assignment by the Hungarian method.
 
+mod choices;
 mod routes;
 mod timing;
 mod yardstick;
@@ -69,13 +73,15 @@ pub struct Bounds {
 
 impl Bounds {
     /// The bounds of a scene at its beginning. None if there is nothing to bring anywhere, some
-    /// task has no path, events wait for one another in a ring, some object can be held in several
-    /// ways or be exchanged for another, or the scene is beyond the limits.
+    /// task has no path, events wait for one another in a ring, or the scene is beyond the limits.
     #[must_use]
     pub fn of(scene: &Scene, limits: BoundLimits) -> Option<Self> {
         let floods = scene.homes.len() + 4 * scene.objects.len();
         let is_plain = (0..scene.objects.len()).all(|object| scene.is_plain(object));
-        if !is_plain || floods.saturating_mul(scene.lattice.len()) > limits.points {
+        if !is_plain {
+            return choices::bounds(scene, limits);
+        }
+        if floods.saturating_mul(scene.lattice.len()) > limits.points {
             return None;
         }
         let grips_s = [scene.robot.grasp_ns, scene.robot.release_ns].map(|ns| ns as f64 / 1e9);
@@ -117,6 +123,21 @@ impl Bounds {
     }
 }
 
+/// The least ways from where robots become free to where they go next: rows are their starts and
+/// `count` releases, columns as many grasps and the robots' homes.
+fn ways_s(count: usize, robots: usize, way_s: impl Fn(usize, usize) -> f64) -> Option<f64> {
+    let size = count + robots;
+    if size <= MOST_ASSIGNED {
+        return least_assignment(size, way_s);
+    }
+    let to_grasp = |column| {
+        (0..size)
+            .map(|row| way_s(row, column))
+            .fold(f64::INFINITY, f64::min)
+    };
+    Some((0..count).map(to_grasp).sum())
+}
+
 /// Rule 32 (b).
 fn shared_s(model: &Model) -> Option<f64> {
     let (count, robots) = (model.count(), model.robots);
@@ -129,15 +150,7 @@ fn shared_s(model: &Model) -> Option<f64> {
             (Some(from), None) => model.turn_s(from, column),
             (Some(from), Some(home)) => model.home_s(from, home),
         };
-    let size = count + robots;
-    let ways_s = if size <= MOST_ASSIGNED {
-        least_assignment(size, way_s)?
-    } else {
-        let to_grasp = |column| (0..size).map(move |row| way_s(row, column));
-        (0..count)
-            .map(|column| to_grasp(column).fold(f64::INFINITY, f64::min))
-            .sum()
-    };
+    let ways_s = ways_s(count, robots, way_s)?;
     let busy_s: f64 = (0..count).map(|k| model.busy_s(k)).sum();
     // Robots that are walled in take no share.
     let reaches = |robot: &usize| (0..count).any(|k| model.approach_s(*robot, k).is_finite());

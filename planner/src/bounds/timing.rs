@@ -28,11 +28,21 @@ pub(crate) struct Model {
     pub(crate) before: Vec<(usize, usize)>,
 }
 
+/// Durations of ways, s, each table row by row: by robot and task, by task, by task and task, by
+/// task and robot, by robot and robot.
+pub(crate) struct Tables {
+    pub(crate) approach_s: Vec<f64>,
+    pub(crate) transfer_s: Vec<f64>,
+    pub(crate) turn_s: Vec<f64>,
+    pub(crate) home_s: Vec<f64>,
+    pub(crate) between_s: Vec<f64>,
+}
+
 impl Model {
     /// None if there is no task, or a task that no robot can do at all.
     pub(crate) fn new(
         legs: &Legs,
-        (grasp_s, release_s): (f64, f64),
+        grips_s: (f64, f64),
         precedences: impl IntoIterator<Item = Precedence>,
     ) -> Option<Self> {
         let (tasks, robots) = (legs.tasks().to_vec(), legs.robots());
@@ -43,6 +53,25 @@ impl Model {
                 .map(|(row, column)| leg(of(row, column)))
                 .collect::<Vec<_>>()
         };
+        let count = tasks.len();
+        let tables = Tables {
+            approach_s: table(robots, count, &|r, k| legs.approach_s(r, tasks[k])),
+            transfer_s: table(1, count, &|_, k| legs.transfer_s(tasks[k])),
+            turn_s: table(count, count, &|i, k| legs.turn_s(tasks[i], tasks[k])),
+            home_s: table(count, robots, &|k, r| legs.home_s(tasks[k], r)),
+            between_s: table(robots, robots, &|from, to| legs.between_s(from, to)),
+        };
+        Self::with(tasks, robots, grips_s, tables, precedences)
+    }
+
+    /// The same from tables, for tasks in ascending order.
+    pub(crate) fn with(
+        tasks: Vec<usize>,
+        robots: usize,
+        (grasp_s, release_s): (f64, f64),
+        tables: Tables,
+        precedences: impl IntoIterator<Item = Precedence>,
+    ) -> Option<Self> {
         let count = tasks.len();
         let number = |event: Event| tasks.binary_search(&event.task()).ok();
         let instant = |event: Event| match event {
@@ -59,11 +88,11 @@ impl Model {
             robots,
             grasp_s,
             release_s,
-            approach_s: table(robots, count, &|r, k| legs.approach_s(r, tasks[k])),
-            transfer_s: table(1, count, &|_, k| legs.transfer_s(tasks[k])),
-            turn_s: table(count, count, &|i, k| legs.turn_s(tasks[i], tasks[k])),
-            home_s: table(count, robots, &|k, r| legs.home_s(tasks[k], r)),
-            between_s: table(robots, robots, &|from, to| legs.between_s(from, to)),
+            approach_s: tables.approach_s,
+            transfer_s: tables.transfer_s,
+            turn_s: tables.turn_s,
+            home_s: tables.home_s,
+            between_s: tables.between_s,
             before,
             tasks,
         };

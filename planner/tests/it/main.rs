@@ -5,6 +5,8 @@ mod bounds;
 #[cfg(test)]
 mod certificate;
 #[cfg(test)]
+mod choices;
+#[cfg(test)]
 mod easy;
 #[cfg(test)]
 mod explained;
