@@ -14,12 +14,14 @@ const LEAST_OBJECTS: f64 = 7.0;
 /// An exponent up to here is called near-linear: neighbours of cells, caches and the logarithm
 /// of a sort take what is beyond 1.
 const NEAR_LINEAR: f64 = 1.25;
+/// What the work of first plans of warehouses is to grow with at most.
+const PLAN_EXPONENT: f64 = 1.5;
 /// The largest task set of the paper's own kind of question, and what is asked of it.
 const LARGE: usize = 1_000;
 const SECONDS: f64 = 10.0;
 
-/// The growth exponent of each step's work and time, with objects and with lattice points.
-pub(super) fn table(by_objects: &Table, by_points: &Table) -> Table {
+/// The growth exponent of each step's work and time, with what each table is swept over.
+pub(super) fn table(swept: [(&Table, &str); 3]) -> Table {
     let mut table = Table::new(
         "growth",
         "Growth: exponent b of a·xᵇ, with its 95 % interval",
@@ -35,8 +37,8 @@ pub(super) fn table(by_objects: &Table, by_points: &Table) -> Table {
     )
     .info("low", "", "lower end of its interval")
     .info("high", "", "upper end");
-    for (rows, against) in [(by_objects, "objects"), (by_points, "points")] {
-        for step in Step::ALL {
+    for (rows, against) in swept {
+        for step in Step::PAPER.into_iter().chain([Step::FirstPlan]) {
             for measure in ["work", "step_wall_s"] {
                 let points = points(rows, step, against, measure);
                 let mut sizes: Vec<_> = points.iter().map(|(x, _)| *x).collect();
@@ -96,7 +98,7 @@ pub(super) fn figures(by_objects: &Table, by_points: &Table) -> Result<Vec<Figur
     ];
     let mut figures = Vec::new();
     for (rows, against, x_label, measure, y_label) in drawn {
-        let series: Vec<_> = Step::ALL
+        let series: Vec<_> = Step::PAPER
             .into_iter()
             .map(|step| series(rows, step, against, measure))
             .filter(|series| !series.points.is_empty())
@@ -158,6 +160,21 @@ pub(super) fn findings(growth: &Table, by_objects: &Table, results: &mut Results
             |exponent| format!("tests made grow as objects to the power of {exponent:.2}"),
         ),
     });
+    for measure in ["work", "step_wall_s"] {
+        let keys = [("step", Step::FirstPlan.name()), ("measure", measure)];
+        let exponent = growth.numbers("exponent", &keys).next();
+        results.findings.push(Finding {
+            claim: format!(
+                "first plans of warehouses: {measure} grows at most as objects to the power of \
+                 {PLAN_EXPONENT}, at fixed density and objects per robot"
+            ),
+            held: exponent.map(|exponent| exponent <= PLAN_EXPONENT),
+            evidence: exponent.map_or_else(
+                || "not enough sizes".to_owned(),
+                |exponent| format!("the exponent is {exponent:.2}"),
+            ),
+        });
+    }
     let objects = LARGE.to_string();
     let keys = [("step", Step::HardFloods.name()), ("objects", &*objects)];
     let times: Vec<_> = by_objects.numbers("step_wall_s", &keys).collect();

@@ -25,6 +25,8 @@ use steps::{Sample, Step, Workbench};
 
 /// Fractions of the pitch for the growth with lattice points.
 const DIVISIONS: [u32; 3] = [1, 2, 4];
+/// Objects for each robot of a warehouse.
+const OBJECTS_PER_ROBOT: usize = 10;
 /// Objects in the room whose pitch is refined.
 const REFINED_OBJECTS: usize = 40;
 
@@ -66,6 +68,14 @@ pub enum PlanningError {
         /// Why not.
         source: GenerateError,
     },
+    /// A warehouse that is no scenario.
+    #[error("a warehouse for {objects} objects is no scenario: {reason}")]
+    Warehouse {
+        /// Objects asked for.
+        objects: usize,
+        /// Why not.
+        reason: String,
+    },
     /// A number of objects that no scenario has.
     #[error("a room with {0} objects: there are from 1 to {MAX_OBJECTS}")]
     Objects(usize),
@@ -92,35 +102,69 @@ pub fn run(
     }
     let refined = DIVISIONS.len() * options.repeats(REFINED_OBJECTS);
     let rooms: usize = sizes.iter().map(|n| options.repeats(*n)).sum();
-    progress.begin((rooms + refined + speedups::STEPS) as u64);
-    let mut by_objects = Sweep::new("by-objects", "Planning against the number of objects");
+    // Fewer objects make no warehouse.
+    let warehouse_sizes = sizes.iter().copied().filter(|n| *n >= OBJECTS_PER_ROBOT);
+    let warehouse_sizes: Vec<usize> = warehouse_sizes.collect();
+    let halls: usize = warehouse_sizes.iter().map(|n| options.repeats(*n)).sum();
+    progress.begin((rooms + refined + halls + speedups::STEPS) as u64);
+    let mut by_objects = Sweep::new(
+        "by-objects",
+        "Planning against the number of objects",
+        &Step::PAPER,
+    );
     for objects in sizes {
         by_objects.measure(options, objects, progress, &mut results, |seed| {
             room::refined(objects, seed, 1)
         })?;
     }
-    let mut by_points = Sweep::new("by-points", "Planning against the number of lattice points");
+    let mut by_points = Sweep::new(
+        "by-points",
+        "Planning against the number of lattice points",
+        &Step::PAPER,
+    );
     for divide in DIVISIONS {
         by_points.measure(options, REFINED_OBJECTS, progress, &mut results, |seed| {
             room::refined(REFINED_OBJECTS, seed, divide)
         })?;
     }
+    let mut warehouses = Sweep::new(
+        "warehouses",
+        "First plans of warehouses, 10 objects a robot",
+        &[Step::FirstPlan],
+    );
+    for objects in warehouse_sizes {
+        warehouses.measure(options, objects, progress, &mut results, |seed| {
+            room::warehouse(objects, seed)
+        })?;
+    }
     let speedups = speedups::measure(options, progress, &mut results)?;
-    let growth = growth::table(&by_objects.table, &by_points.table);
+    let swept = [
+        (&by_objects.table, "objects"),
+        (&by_points.table, "points"),
+        (&warehouses.table, "objects"),
+    ];
+    let growth = growth::table(swept);
     let figures = growth::figures(&by_objects.table, &by_points.table)?;
     growth::findings(&growth, &by_objects.table, &mut results);
     results.notes.push(room::ABOUT.to_owned());
-    results.tables = vec![growth, speedups, by_objects.table, by_points.table];
+    results.tables = vec![
+        growth,
+        speedups,
+        by_objects.table,
+        by_points.table,
+        warehouses.table,
+    ];
     Ok((results, figures))
 }
 
 /// All steps in rooms of one size after the other.
 struct Sweep {
     table: Table,
+    steps: &'static [Step],
 }
 
 impl Sweep {
-    fn new(name: &str, title: &str) -> Self {
+    fn new(name: &str, title: &str, steps: &'static [Step]) -> Self {
         let table = Table::new(name, title)
             .key("step", "", "what was computed")
             .key("objects", "", "objects in the room")
@@ -140,7 +184,7 @@ impl Sweep {
                 "modelled work units the paper's way costs",
             )
             .lower("step_wall_s", "s", "wall time");
-        Self { table }
+        Self { table, steps }
     }
 
     fn measure(
@@ -160,7 +204,7 @@ impl Sweep {
             let size = format!("{objects} objects, {} points", room.points());
             progress.step(&size);
             let mut bench = Workbench::new(&room);
-            for step in Step::ALL {
+            for &step in self.steps {
                 let cells = step.cells(objects, room.points());
                 if cells > options.most_cells() {
                     results.notes.extend((repeat == 0).then(|| {

@@ -50,6 +50,25 @@ pub(super) fn refined(objects: usize, seed: u64, divide: u32) -> Result<Room, Pl
     of_area(objects, area_m2, walls, seed, divide)
 }
 
+/// A warehouse.
+pub(super) fn warehouse(objects: usize, seed: u64) -> Result<Room, PlanningError> {
+    let robots = objects / super::OBJECTS_PER_ROBOT;
+    let made = scene::warehouse(objects, robots, seed);
+    let text = made.map_err(|source| PlanningError::Room { objects, source })?;
+    let scene = scene::parse(&text, "warehouse.toml");
+    let scene = scene.map_err(|error| PlanningError::Warehouse {
+        objects,
+        reason: error.to_string(),
+    })?;
+    let lattice = &scene.lattice;
+    Ok(Room {
+        // All of the hall: racks are objects.
+        area_m2: lattice.len() as f64 * lattice.pitch_m * lattice.pitch_m,
+        places: Vec::new(),
+        scene,
+    })
+}
+
 /// Any density.
 pub(super) fn of_area(
     objects: usize,

@@ -7,7 +7,8 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use planner::{
-    EasyConstraints, Floods, HardConstraints, Kind, PathSearch, PriorityGraph, Selection, easy,
+    EasyConstraints, Floods, HardConstraints, Kind, PathSearch, Planner, PlannerInput,
+    PriorityGraph, Selection, easy,
 };
 use scene::{Budget, HardMode, Method, Settings};
 use shm_types::{Checked, Constraint, ConstraintTable, Counters, WorldSnapshot, zeroed};
@@ -30,10 +31,12 @@ pub(super) enum Step {
     Selection,
     SelectionAgain,
     PathSearch,
+    FirstPlan,
 }
 
 impl Step {
-    pub(super) const ALL: [Self; 9] = [
+    /// Those that rooms of the paper's kind are measured with.
+    pub(super) const PAPER: [Self; 9] = [
         Self::Easy,
         Self::EasyPlain,
         Self::HardOfOne,
@@ -56,15 +59,18 @@ impl Step {
             Self::Selection => "first selection",
             Self::SelectionAgain => "selection, lengths known",
             Self::PathSearch => "path search",
+            Self::FirstPlan => "first plan for all robots",
         }
     }
 
     pub(super) const fn counted(self) -> &'static str {
         match self {
             Self::Easy | Self::EasyPlain => "polygon tests made",
-            Self::HardOfOne | Self::HardPlain | Self::Selection | Self::PathSearch => {
-                "cells expanded"
-            }
+            Self::HardOfOne
+            | Self::HardPlain
+            | Self::Selection
+            | Self::PathSearch
+            | Self::FirstPlan => "cells expanded",
             Self::HardFloods => "runs of points",
             Self::Priority => "tasks and edges",
             Self::SelectionAgain => "units",
@@ -78,9 +84,12 @@ impl Step {
             Self::HardOfOne => 4.0 * objects * 0.2 * points,
             Self::HardPlain => 2.0 * objects * objects * 0.1 * points,
             Self::Selection | Self::SelectionAgain => objects * 0.7 * points,
-            Self::Easy | Self::EasyPlain | Self::HardFloods | Self::Priority | Self::PathSearch => {
-                0.0
-            }
+            Self::Easy
+            | Self::EasyPlain
+            | Self::HardFloods
+            | Self::Priority
+            | Self::PathSearch
+            | Self::FirstPlan => 0.0,
         }
     }
 }
@@ -142,6 +151,36 @@ impl<'a> Workbench<'a> {
                 }
             }
             Step::PathSearch => self.path_search(repeat),
+            Step::FirstPlan => self.first_plan(),
+        }
+    }
+
+    /// From an empty planner to the schedule that robots begin with.
+    fn first_plan(&self) -> Sample {
+        let scene = &self.room.scene;
+        let settings = Settings {
+            method: Method::Anytime,
+            // Nothing is worth waiting for: the first plan is written down as it is found.
+            units_per_second: 1,
+            ..Settings::default()
+        };
+        let mut snapshot = zeroed();
+        World::new(scene, settings.clone(), 0).snapshot_into(&mut snapshot);
+        let mut planner = Planner::new(scene, settings);
+        let (planned, time_s) = timed(|| {
+            let snapshot = Checked::new(&*snapshot, scene.counts()).ok()?;
+            let input = PlannerInput {
+                snapshot,
+                requests: &[],
+            };
+            let output = planner.step(scene, input, u64::MAX);
+            output.schedule.map(|_| output.report.counters)
+        });
+        let counters = planned.unwrap_or_default();
+        Sample {
+            work: counters.cells_expanded,
+            charged_units: Some(counters.units),
+            time_s: if planned.is_some() { time_s } else { f64::NAN },
         }
     }
 
