@@ -242,7 +242,7 @@ fn a_run_whose_supervisor_dies_is_listed_and_resumed_to_its_end() {
     assert_solved(&mut run);
 }
 
-/// Puts robot 0 into a wall, in both states that the journal of a dead run holds, with checksums that
+/// Puts robot 0 into a wall, in all states that the journal of a dead run holds, with checksums that
 /// fit: what a fault of the world itself would leave.
 fn put_robot_into_wall(run: &Run) {
     /// Where the first robot's place is after the first word of a state.
@@ -252,7 +252,8 @@ fn put_robot_into_wall(run: &Run) {
     let starts: Vec<usize> = (16..journal.len() - 4)
         .filter(|at| &journal[*at..at + 4] == b"rrck")
         .collect();
-    assert_eq!(starts.len(), 2, "one in each slot");
+    // One in each slot, or a single one of a run that was killed at its beginning.
+    assert!((1..=2).contains(&starts.len()), "{starts:?}");
     for at in starts {
         let length = u64::from_le_bytes(journal[at - 8..at].try_into().unwrap()) as usize;
         let (state, sum) = journal[at..at + length].split_at_mut(length - 8);
