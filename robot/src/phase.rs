@@ -80,6 +80,15 @@ impl Phase {
         }
     }
 
+    /// Whether a robot may find itself holding an object in this phase. In any other one it has
+    /// missed the snapshots in which its grip closed.
+    pub(crate) fn may_hold(&self) -> bool {
+        matches!(
+            self,
+            Self::Starting | Self::Grasping(_) | Self::Transfer(_) | Self::Releasing
+        )
+    }
+
     /// Adds what the phase carries, in a fixed order.
     pub(crate) fn hash_into(&self, hash: &mut StateHash) {
         hash.add(&self.wire().code());

@@ -194,8 +194,12 @@ impl Selector {
     /// Goes from phase to phase until this tick's work is done or spent.
     fn act(&mut self, now: &Now<'_>, units: u64, intent: &mut Intent) -> (WirePhase, Doing) {
         self.thinking.budget = Budget::new(units);
-        if now.epoch() != intent.selected_epoch {
-            self.phase = self.phase.reselect(now.is_gripping());
+        match now.holding() {
+            None if now.epoch() != intent.selected_epoch => {
+                self.phase = self.phase.reselect(now.is_gripping());
+            }
+            Some(task) if !self.phase.may_hold() => self.phase = carry(now, intent, task),
+            _ => {}
         }
         let doing = loop {
             match self.next(now, intent) {
@@ -232,10 +236,13 @@ impl Selector {
 fn take_up(now: &Now<'_>, intent: &mut Intent) -> Phase {
     intent.take_up(now);
     match now.holding() {
-        Some(task) => {
-            intent.claim = select::claim(now, Some(task));
-            transfer::begin(now, intent, task)
-        }
+        Some(task) => carry(now, intent, task),
         None => Phase::Selecting(Selecting::after(None)),
     }
+}
+
+/// A robot that finds itself holding an object brings it to its goal (rule 19).
+fn carry(now: &Now<'_>, intent: &mut Intent, task: usize) -> Phase {
+    intent.claim = select::claim(now, Some(task));
+    transfer::begin(now, intent, task)
 }

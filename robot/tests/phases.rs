@@ -386,6 +386,21 @@ fn a_started_robot_that_holds_an_object_goes_on_with_it() {
 }
 
 #[test]
+fn a_robot_that_missed_how_its_grip_closed_goes_on_with_what_it_holds() {
+    let mut bench = Bench::new(Method::GraspingAndRestricted);
+    bench.step();
+    assert_eq!(bench.phase(), Phase::Transit);
+    bench.tick();
+    bench.open_epoch();
+    bench.let_it_hold();
+    bench.step();
+    assert_eq!(
+        (bench.phase(), bench.command.claim.task),
+        (Phase::Transfer, 0)
+    );
+}
+
+#[test]
 fn a_new_epoch_that_leaves_it_its_task_does_not_stop_it() {
     let mut bench = Bench::new(Method::GraspingAndRestricted);
     bench.step();

@@ -115,11 +115,12 @@ impl Script {
                 }
                 (*action, waits)
             });
+            let is_all_kept = plan.tracks()[robot].deeds.len() == kept(robot);
             let known = &before.robots[robot];
             let kept = &known.actions[..(part.kept - known.first) as usize];
             let actions: Vec<_> = kept.iter().cloned().chain(actions).collect();
-            // The last piece, to where the robot stays, comes after all deeds.
-            let is_same = actions.len() == known.actions.len() && actions.len() <= kept.len() + 1;
+            // Beside what is kept there may be the last pieces, to where the robot stays.
+            let is_same = is_all_kept && is_alike(&actions, &known.actions);
             Part {
                 first: known.first,
                 begun: known.begun,
@@ -305,13 +306,25 @@ fn join(
             .granted
             .push(joined.kept + joined.actions.len() as u32);
     }
-    if track.deeds.len() > kept.len() && cell == plan.home(robot) {
-        joined.stop(track.deeds.len(), scene, cell, scene.homes[robot]);
+    let home = scene.homes[robot];
+    let is_still = track.deeds.is_empty();
+    let stays = is_still && (track.is_gone || (track.from - home).norm() <= CONTACT_M);
+    if !stays && cell == plan.home(robot) {
+        if is_still && !is_at(scene, cell, track.from) {
+            joined.begin(0, point(scene.lattice.at(cell)));
+        }
+        joined.stop(track.deeds.len(), scene, cell, home);
     }
     joined
         .granted
         .push(joined.kept + joined.actions.len() as u32);
     joined
+}
+
+/// Whether actions lead to the same places after the same waits.
+fn is_alike(some: &[(Action, Vec<Wait>)], others: &[(Action, Vec<Wait>)]) -> bool {
+    let place = |(action, waits): &(Action, Vec<Wait>)| (action.to, action.grip, waits.clone());
+    some.iter().map(place).eq(others.iter().map(place))
 }
 
 fn is_at(scene: &Scene, cell: u32, at: Vec2) -> bool {
@@ -378,10 +391,58 @@ impl Joined {
 
 #[cfg(test)]
 mod tests {
+    use scene::Settings;
     use shm_types::capacity::MAX_WAITS;
     use shm_types::{Point, zeroed};
 
     use super::*;
+    use crate::anytime::keep::kept;
+    use crate::anytime::solver::Solver;
+
+    fn ends_at_home(scene: &Scene, script: &Script) {
+        for (part, home) in script.robots.iter().zip(&scene.homes) {
+            let (last, _) = part.actions.last().unwrap();
+            assert!((scene::vec(last.to) - home).norm() <= CONTACT_M, "{last:?}");
+        }
+    }
+
+    #[test]
+    fn robots_that_only_stand_beside_their_homes_end_there_too() {
+        for seed in 0..6 {
+            let options = scene::GenerateOptions {
+                seed,
+                objects: 1,
+                robots: 3,
+                ..scene::GenerateOptions::default()
+            };
+            let scene = scene::generate(&options).unwrap().scene;
+            let mut situation = Situation::at_start(&scene);
+            let ground = Ground::new(&scene, &Settings::default(), Vec::new());
+            for robot in &mut situation.robots {
+                let beside = [
+                    [0.004, 0.003],
+                    [0.004, -0.003],
+                    [-0.004, 0.003],
+                    [-0.004, -0.003],
+                ];
+                let mut beside = beside.iter().map(|&by| robot.at + Vec2::from(by));
+                let is_free = |at: &Vec2| ground.entry(&scene, &[0], *at, &[]).is_some();
+                robot.at = beside.find(is_free).unwrap();
+            }
+            let mut solver = Solver::new(&scene, &Settings::default(), &situation).unwrap();
+            let makespan = (0..5).find_map(|attempt| solver.first(&scene, attempt));
+            solver.restore().unwrap();
+            let script = Script::of(&scene, &solver.ground, &solver.plan, &situation);
+            ends_at_home(&scene, &script);
+            let robots = vec![RobotState::default(); scene.homes.len()];
+            let until = makespan.unwrap() / 3;
+            if solver.go_on(&scene, |tracks| kept(&script, tracks, &robots, until)) {
+                solver.improve(&scene);
+                solver.restore();
+                ends_at_home(&scene, &script.go_on(&scene, &solver.ground, &solver.plan));
+            }
+        }
+    }
 
     /// A robot with more actions than a message has room for, each with so many waits.
     fn script(actions: usize, waits: usize) -> Script {
