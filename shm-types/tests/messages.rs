@@ -3,6 +3,7 @@
 use std::mem::offset_of;
 
 use proptest::prelude::*;
+use shm_types::capacity::{MAX_ACTIONS, MAX_WAITS};
 use shm_types::{
     Action, Checked, Command, ConstraintTable, Counts, Grip, Invalid, MotionBatch, NONE,
     ObjectState, RobotSchedule, RobotState, Schedule, SnapshotHeader, StateHash, Validate, Wait,
@@ -212,9 +213,15 @@ fn a_schedule_with_one_bad_value_is_refused() {
     type Plant = fn(&mut Schedule);
     let plants: [(Plant, &str); 16] = [
         (|s| s.robot_count += 1, "a robot that is not there"),
-        (|s| s.action_count = 16_385, "actions over capacity"),
+        (
+            |s| s.action_count = MAX_ACTIONS as u32 + 1,
+            "actions over capacity",
+        ),
         (|s| s.action_count = 2, "actions past the live ones"),
-        (|s| s.wait_count = 65_537, "waits over capacity"),
+        (
+            |s| s.wait_count = MAX_WAITS as u32 + 1,
+            "waits over capacity",
+        ),
         (|s| s.wait_count = 0, "waits past the live ones"),
         (|s| s.robots[0].complete = 2, "complete"),
         (|s| s.robots[1].offset = u32::MAX, "offset"),
@@ -311,8 +318,8 @@ proptest! {
             *byte = x as u8;
         }
         // Counts within capacity, so that all that follows is looked at too.
-        (schedule.robot_count, schedule.action_count) = (2, 16_384);
-        schedule.wait_count %= 65_537;
+        (schedule.robot_count, schedule.action_count) = (2, MAX_ACTIONS as u32);
+        schedule.wait_count %= MAX_WAITS as u32 + 1;
         let _ = Checked::new(&*schedule, COUNTS).map(|s| s.actions_of(0).len());
     }
 
