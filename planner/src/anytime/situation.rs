@@ -92,17 +92,36 @@ impl Situation {
     /// What stands where robots are gone: shapes, and where.
     pub(crate) fn obstacles(&self, scene: &Scene) -> Vec<(Shape, Vec2)> {
         let gone = self.robots.iter().filter(|robot| !robot.is_live);
-        gone.flat_map(|robot| {
-            let class = robot.holds.map_or(scene::ROBOT_ALONE, |object| {
-                let offset = robot.at - self.objects[object].at;
-                let by = scene.grasp_by(object, offset).unwrap_or(0);
-                scene.objects[object].grasps[by].class
-            });
-            let body: &Body = scene.body(class);
-            let parts = body.parts.iter();
-            parts.map(|part| (part.bare.clone(), robot.at + part.offset))
-        })
-        .collect()
+        gone.flat_map(|robot| self.bodies(scene, robot)).collect()
+    }
+
+    /// A robot and what it holds: shapes, and where.
+    fn bodies<'a>(
+        &self,
+        scene: &'a Scene,
+        robot: &RobotAt,
+    ) -> impl Iterator<Item = (Shape, Vec2)> + use<'a> {
+        let class = robot.holds.map_or(scene::ROBOT_ALONE, |object| {
+            let offset = robot.at - self.objects[object].at;
+            let by = scene.grasp_by(object, offset).unwrap_or(0);
+            scene.objects[object].grasps[by].class
+        });
+        let body: &Body = scene.body(class);
+        let at = robot.at;
+        let parts = body.parts.iter();
+        parts.map(move |part| (part.bare.clone(), at + part.offset))
+    }
+
+    /// Whether a robot that holds nothing would meet another one on its way to `to`, if the others
+    /// stay where they are.
+    pub(crate) fn meets_robot(&self, scene: &Scene, robot: usize, to: Vec2) -> bool {
+        let from = self.robots[robot].at;
+        let body = scene.body(scene::ROBOT_ALONE);
+        let others = self.robots.iter().enumerate();
+        let others = others.filter(|(other, state)| *other != robot && state.is_live);
+        others
+            .flat_map(|(_, other)| self.bodies(scene, other))
+            .any(|(shape, at)| body.sweeps(from, to, true, &shape, at, at))
     }
 }
 

@@ -265,7 +265,7 @@ impl Start {
                 (place, state.put_downs)
             })
             .collect::<Vec<_>>();
-        let robots = situation.robots.iter().map(|robot| {
+        let robots = situation.robots.iter().enumerate().map(|(number, robot)| {
             if !robot.is_live {
                 return Some(Track {
                     is_gone: true,
@@ -273,7 +273,15 @@ impl Start {
                 });
             }
             let Some(object) = robot.holds else {
-                let cell = ground.entry(scene, &[ROBOT_ALONE.0], robot.at, &[])?;
+                // To a lattice point that it gets to past whatever stands there, if there is one.
+                let mut around: Vec<u32> = scene.lattice.around(robot.at).collect();
+                around.retain(|&cell| {
+                    (objects.iter()).any(|(place, _)| place.has_in_its_room(cell))
+                        || situation.meets_robot(scene, number, scene.lattice.at(cell))
+                });
+                around.sort_unstable();
+                let entry = |but: &[u32]| ground.entry(scene, &[ROBOT_ALONE.0], robot.at, but);
+                let cell = entry(&around).or_else(|| entry(&[]))?;
                 return Some(Track::parked(cell, robot.at));
             };
             let place = &objects[object].0;
