@@ -250,7 +250,7 @@ fn bit(words: &[u64], index: usize) -> bool {
 /// The indices of the bits set, ascending.
 fn bits(words: &[u64]) -> impl Iterator<Item = usize> + '_ {
     words.iter().enumerate().flat_map(|(i, &word)| {
-        std::iter::successors(Some(word), |w| Some(w & (w - 1)))
+        std::iter::successors(Some(word), |w| Some(w & w.wrapping_sub(1)))
             .take_while(|w| *w != 0)
             .map(move |w| i * 64 + w.trailing_zeros() as usize)
     })

@@ -20,6 +20,11 @@ use crate::{
 /// overflow.
 const MOST_TICKS: u64 = 1 << 60;
 
+/// Nor to a version past this one, or to a place further from the origin, m: there doubles are coarser
+/// than what divides touching from overlapping.
+const MOST_VERSIONS: u32 = 1 << 31;
+const FURTHEST_M: f64 = 1e12;
+
 /// Why a message was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Invalid {
@@ -51,8 +56,8 @@ pub enum Invalid {
         /// Ids below this are in range.
         count: u32,
     },
-    /// A number that is not finite.
-    #[error("{what} is not finite")]
+    /// A number that is not finite, or of a place that nothing can be at.
+    #[error("{what} is not finite or too far away")]
     NotFinite {
         /// Which number.
         what: &'static str,
@@ -186,7 +191,7 @@ fn id_or_none(what: &'static str, value: u32, count: u32) -> Result<(), Invalid>
 }
 
 fn finite(what: &'static str, point: Point) -> Result<(), Invalid> {
-    if point.is_finite() {
+    if point.x.abs() <= FURTHEST_M && point.y.abs() <= FURTHEST_M {
         Ok(())
     } else {
         Err(Invalid::NotFinite { what })
@@ -198,6 +203,23 @@ fn flag(what: &'static str, code: u32) -> Result<(), Invalid> {
         Ok(())
     } else {
         Err(Invalid::Tag { what, code })
+    }
+}
+
+/// A number that a run can come to.
+fn possible(what: &'static str, number: u64) -> Result<(), Invalid> {
+    if number > MOST_TICKS {
+        Err(Invalid::Inconsistent { what })
+    } else {
+        Ok(())
+    }
+}
+
+fn version(number: u32) -> Result<(), Invalid> {
+    if number > MOST_VERSIONS {
+        Err(Invalid::Inconsistent { what: "a version" })
+    } else {
+        Ok(())
     }
 }
 
@@ -228,10 +250,16 @@ impl Validate for WorldSnapshot {
         }
         Outcome::decode(header.outcome)?;
         flag("held", header.held)?;
-        if header.tick > MOST_TICKS || header.time_ns > MOST_TICKS || header.epoch > MOST_TICKS {
-            return Err(Invalid::Inconsistent {
-                what: "a tick, a time or an epoch that no run comes to",
-            });
+        possible("a tick", header.tick)?;
+        possible("a time", header.time_ns)?;
+        possible("an epoch", header.epoch)?;
+        for number in [
+            header.constraints_version,
+            header.epoch_constraints_version,
+            header.schedule_version,
+            header.scene_version,
+        ] {
+            version(number)?;
         }
         for robot in &self.robots[..header.robot_count as usize] {
             finite("a robot's position", robot.position)?;
@@ -292,6 +320,7 @@ impl Validate for Command {
 
 impl Validate for ConstraintTable {
     fn validate(&self, counts: Counts) -> Result<(), Invalid> {
+        version(self.version)?;
         count("constraints", self.count, MAX_CONSTRAINTS)?;
         for constraint in self.constraints() {
             id("a task", constraint.before, counts.objects)?;
@@ -314,6 +343,7 @@ impl Validate for ConstraintTable {
 
 impl Validate for Schedule {
     fn validate(&self, counts: Counts) -> Result<(), Invalid> {
+        version(self.version)?;
         // One that was made before a robot was added lists nothing for it.
         if self.robot_count > counts.robots {
             return Err(Invalid::Inconsistent {
@@ -376,6 +406,7 @@ impl Validate for HardAnswer {
 
 impl Validate for PlannerReport {
     fn validate(&self, _counts: Counts) -> Result<(), Invalid> {
+        possible("the tick it answers", self.tick)?;
         flag("busy", self.busy)?;
         Verdict::decode(self.verdict).map(|_| ())
     }
@@ -383,6 +414,7 @@ impl Validate for PlannerReport {
 
 impl Validate for RecorderReport {
     fn validate(&self, _counts: Counts) -> Result<(), Invalid> {
+        possible("the number of the next batch", self.next_sequence)?;
         if self.lost > self.next_sequence {
             return Err(Invalid::Inconsistent {
                 what: "the number of lost batches",
@@ -421,6 +453,9 @@ impl Validate for ControlRequest {
 
 impl Validate for MotionBatch {
     fn validate(&self, counts: Counts) -> Result<(), Invalid> {
+        possible("the number of a batch", self.sequence)?;
+        possible("a tick", self.tick)?;
+        possible("a time", self.time_ns)?;
         count("motions", self.motion_count, MAX_MOTIONS)?;
         count("events", self.event_count, MAX_EVENTS)?;
         for motion in self.motions() {

@@ -6,8 +6,8 @@ use proptest::prelude::*;
 use shm_types::capacity::{MAX_ACTIONS, MAX_WAITS};
 use shm_types::{
     Action, Checked, Command, ConstraintTable, Counts, Grip, Invalid, MotionBatch, NONE,
-    ObjectState, RobotSchedule, RobotState, Schedule, SnapshotHeader, StateHash, Validate, Wait,
-    WorldSnapshot, zeroed,
+    ObjectState, PlannerReport, RecorderReport, RobotSchedule, RobotState, Schedule,
+    SnapshotHeader, StateHash, Validate, Wait, WorldSnapshot, zeroed,
 };
 use zerocopy::{FromBytes, IntoBytes};
 
@@ -82,14 +82,19 @@ fn what_is_past_the_counts_is_no_state() {
 #[test]
 fn a_snapshot_with_one_bad_value_is_refused() {
     type Plant = fn(&mut WorldSnapshot);
-    let plants: [(Plant, &str); 13] = [
+    let plants: [(Plant, &str); 18] = [
         (|s| s.header.magic = 0, "magic"),
         (|s| s.header.layout_version += 1, "layout"),
         (|s| s.header.robot_count = 129, "over capacity"),
         (|s| s.header.object_count = 2, "other run"),
         (|s| s.header.outcome = 99, "outcome"),
         (|s| s.header.held = 2, "held"),
+        (|s| s.header.tick = u64::MAX, "tick"),
+        (|s| s.header.epoch = u64::MAX, "epoch"),
+        (|s| s.header.constraints_version = u32::MAX, "table"),
+        (|s| s.header.schedule_version = u32::MAX, "schedule"),
         (|s| s.robots[0].position.x = f64::NAN, "position"),
+        (|s| s.robots[0].position.x = -1e300, "position"),
         (|s| s.robots[1].task = 3, "task"),
         (|s| s.robots[1].phase = 8, "phase"),
         (|s| s.robots[1].grant_count = 33, "grant"),
@@ -180,6 +185,28 @@ fn constraints_must_be_sorted_in_range_and_not_reflexive() {
         kind: 1,
     };
     assert!(table.validate(COUNTS).is_err());
+}
+
+#[test]
+fn numbers_that_no_run_comes_to_are_refused() {
+    let report = |tick| PlannerReport {
+        tick,
+        ..PlannerReport::default()
+    };
+    assert_eq!(report(1 << 40).validate(COUNTS), Ok(()));
+    assert!(report(u64::MAX).validate(COUNTS).is_err());
+    let mut table: Box<ConstraintTable> = zeroed();
+    table.version = u32::MAX;
+    assert!(table.validate(COUNTS).is_err());
+    let mut batch: Box<MotionBatch> = zeroed();
+    assert_eq!(batch.validate(COUNTS), Ok(()));
+    batch.sequence = u64::MAX;
+    assert!(batch.validate(COUNTS).is_err());
+    let recorder = RecorderReport {
+        next_sequence: u64::MAX,
+        ..RecorderReport::default()
+    };
+    assert!(recorder.validate(COUNTS).is_err());
 }
 
 /// Two robots with two actions and one action, and a wait.

@@ -3,6 +3,8 @@
 //! Responsible for: their names, in one place, and the schema each is published with.
 //! Not responsible for: what is written to them when (`writer`, `reader`).
 
+use std::sync::LazyLock;
+
 use schemars::{JsonSchema, Schema, schema_for};
 
 use crate::record::{End, Event, Gap, Mark, Motion, SceneRecord, State};
@@ -56,12 +58,22 @@ impl Channel {
             .find(|channel| channel.topic() == topic)
     }
 
-    /// Name and JSON Schema of its records.
-    pub(crate) fn schema(self) -> (String, Schema) {
+    /// Name and JSON Schema of its records, as text. Made once: whoever writes one trace after the
+    /// other would do little else.
+    pub(crate) fn schema(self) -> (String, &'static str) {
+        static SCHEMAS: LazyLock<[String; Channel::ALL.len()]> =
+            LazyLock::new(|| Channel::ALL.map(|channel| channel.made().to_value().to_string()));
+        (
+            format!("{PROFILE}.{}", self.topic()),
+            &SCHEMAS[self as usize],
+        )
+    }
+
+    fn made(self) -> Schema {
         fn of<T: JsonSchema>() -> Schema {
             schema_for!(T)
         }
-        let schema = match self {
+        match self {
             Self::Scene => of::<SceneRecord>(),
             Self::Motion => of::<Motion>(),
             Self::Event => of::<Event>(),
@@ -69,8 +81,7 @@ impl Channel {
             Self::Mark => of::<Mark>(),
             Self::Gap => of::<Gap>(),
             Self::End => of::<End>(),
-        };
-        (format!("{PROFILE}.{}", self.topic()), schema)
+        }
     }
 }
 
@@ -85,7 +96,7 @@ mod tests {
             assert_eq!(Channel::of_topic(channel.topic()), Some(channel));
             let (name, schema) = channel.schema();
             assert_eq!(name, format!("rearrange.{}", channel.topic()));
-            let schema = schema.to_value();
+            let schema: serde_json::Value = serde_json::from_str(schema).unwrap();
             assert_eq!(schema["type"], "object", "{name}");
             assert!(schema["properties"].is_object(), "{name}");
         }

@@ -222,7 +222,7 @@ impl<W: Write> Writer<W> {
             } else if *channel == Channel::Gap
                 && let Ok(gap) = serde_json::from_slice::<Gap>(json)
             {
-                writer.missing += gap.batches;
+                writer.missing = writer.missing.saturating_add(gap.batches);
             }
             writer.write_json(*channel, *time_ns, json)?;
         }
@@ -238,11 +238,7 @@ impl<W: Write> Writer<W> {
     fn open(&mut self, channel: Channel) -> Result<(), WriteError> {
         let (name, schema) = channel.schema();
         let topic = channel.topic();
-        let schema = serde_json::to_vec(&schema).map_err(|source| WriteError::Json {
-            channel: topic,
-            source,
-        })?;
-        let schema = self.file.add_schema(&name, SCHEMA_ENCODING, &schema)?;
+        let schema = (self.file).add_schema(&name, SCHEMA_ENCODING, schema.as_bytes())?;
         let id = self
             .file
             .add_channel(schema, topic, ENCODING, &BTreeMap::new())?;
@@ -322,7 +318,7 @@ impl<W: Write> Writer<W> {
             batches,
         };
         self.write(Channel::Gap, self.last.time_ns, &gap)?;
-        self.missing += batches;
+        self.missing = self.missing.saturating_add(batches);
         self.resync_from = Some(before_tick.saturating_sub(1));
         Ok(())
     }

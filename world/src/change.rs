@@ -108,6 +108,8 @@ impl World {
             return Err(NotMade::Over);
         }
         let mut moved: Vec<usize> = changes.iter().filter_map(Change::moved).collect();
+        // One that is new is put where these changes say, whether at once or by and by.
+        moved.retain(|&object| object < self.objects.len());
         moved.sort_unstable();
         moved.dedup();
         let next = Next {
@@ -385,6 +387,14 @@ mod tests {
         bench.step();
         assert!(bench.events(EventKind::Changed).is_empty());
         assert_eq!(bench.header().scene_version, 1);
+    }
+
+    #[test]
+    fn what_is_new_can_be_put_elsewhere_by_the_same_changes() {
+        let mut bench = bench(ahead());
+        make(&mut bench, &[add_at([5.0, 3.0]), move_to(2, FAR)]);
+        assert_eq!(bench.object(2).position, Point::new(FAR[0], FAR[1]));
+        assert!(bench.events(EventKind::Moved).is_empty(), "it is new");
     }
 
     #[test]

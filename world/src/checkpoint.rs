@@ -469,7 +469,11 @@ impl World {
             let waits_for = robot.link.waits_for.robot;
             sound("whom a robot waits for", id_in(waits_for, robots))?;
         }
-        for object in self.objects.iter() {
+        for (id, object) in self.objects.iter().enumerate() {
+            let hands = (self.robots.iter()).filter(|robot| robot.hand.object() == Some(id));
+            // It stands on the ground, or one robot has it, or is about to.
+            let places = hands.count() + usize::from(self.bodies.ground.place(id).is_some());
+            sound("where an object is", places == 1)?;
             sound("a holder", is_robot(object.holder))?;
             sound("who has claimed a task", is_robot(object.claimed_by))?;
         }
@@ -569,6 +573,20 @@ mod tests {
             }
         }
         assert!(refused > 100 && taken > 100, "{refused} and {taken}");
+    }
+
+    #[test]
+    fn an_object_is_in_one_place() {
+        let mut bench = bench();
+        bench.world.robots[0].hand = Hand::Holding { object: 1 };
+        let there_too = CheckpointError::Unsound("where an object is");
+        let error = restore(&bench, &saved(&bench)).err();
+        assert_eq!(error, Some(there_too.clone()), "on the ground");
+        bench.world.bodies.ground.take(1);
+        assert!(restore(&bench, &saved(&bench)).is_ok());
+        bench.world.robots[1].hand = Hand::Holding { object: 1 };
+        let error = restore(&bench, &saved(&bench)).err();
+        assert_eq!(error, Some(there_too), "in another hand");
     }
 
     #[test]

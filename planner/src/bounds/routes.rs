@@ -138,7 +138,7 @@ fn earlier(model: &Model) -> Vec<usize> {
 
 /// The members of a set, ascending.
 pub(crate) fn members(set: usize) -> impl Iterator<Item = usize> {
-    std::iter::successors(Some(set), |left| Some(left & (left - 1)))
+    std::iter::successors(Some(set), |left| Some(left & left.wrapping_sub(1)))
         .take_while(|left| *left != 0)
         .map(|left| left.trailing_zeros() as usize)
 }
