@@ -29,7 +29,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 /// First word of the file: "rrjournl" in ASCII, little endian.
 const MAGIC: u64 = u64::from_le_bytes(*b"rrjournl");
 /// Form of the file. Raised whenever it changes.
-const VERSION: u32 = 2;
+const VERSION: u64 = 3;
 /// Bytes of batches that are kept.
 const RING: usize = 4 << 20;
 /// Batches that are kept at most.
@@ -43,9 +43,9 @@ const SLOT_HEAD: usize = 16;
 /// Bytes of the length that each part begins with: that of the rest of it.
 const LENGTH: usize = 8;
 /// Where things lie.
-const INDEX: usize = 4_096;
-const RING_AT: usize = INDEX + KEPT as usize * size_of::<Place>();
-const SLOTS_AT: usize = RING_AT + RING;
+pub(crate) const INDEX: usize = 4_096;
+pub(crate) const RING_AT: usize = INDEX + KEPT as usize * size_of::<Place>();
+pub(crate) const SLOTS_AT: usize = RING_AT + RING;
 
 const _: () = assert!(2 * LARGEST < RING);
 const _: () = assert!(size_of::<Head>() <= INDEX);
@@ -55,11 +55,19 @@ const _: () = assert!(size_of::<Head>() <= INDEX);
 #[repr(C)]
 struct Head {
     magic: u64,
-    version: u32,
-    /// Which world process writes it, from 1.
-    generation: u32,
+    version: u64,
     run_id: u64,
     slot_bytes: u64,
+    /// Which world process writes it, from 1; and from bit 32 on the opposite of that.
+    generation: u64,
+}
+
+impl Head {
+    /// Whether it begins a journal of the same run and form.
+    fn is_as(&self, other: &Self) -> bool {
+        let form = |head: &Self| (head.magic, head.version, head.run_id, head.slot_bytes);
+        form(self) == form(other)
+    }
 }
 
 /// Where a batch lies in the ring.
@@ -134,10 +142,10 @@ pub(crate) struct Journal {
 
 impl Journal {
     /// Opens the journal of a run, or makes one with room for states of parts of at most so many
-    /// bytes each; the states in it, newest first.
+    /// bytes each; the states in it, newest first. One that is not whole is among them.
     ///
     /// # Errors
-    /// The system refused, or the journal has another form.
+    /// The system refused, or the journal has another form, or is damaged.
     pub(crate) fn open(
         path: &Path,
         run_id: u64,
@@ -150,24 +158,35 @@ impl Journal {
             .truncate(false)
             .mode(0o600)
             .open(path)?;
-        let old = read_head(&file)?
-            .filter(|head| head.magic == MAGIC && head.version == VERSION && head.run_id == run_id);
         let slots = Slots::new(rooms);
         let slot_bytes = slots.bytes();
-        if old.is_some_and(|head| head.slot_bytes != slot_bytes as u64) {
-            return Err(io::ErrorKind::InvalidData.into());
-        }
         let length = SLOTS_AT + 2 * slot_bytes;
-        if old.is_none() {
-            file.set_len(0)?;
-        }
-        if file.metadata()?.len() != length as u64 {
-            file.set_len(length as u64)?;
-        }
+        let old = Head {
+            magic: MAGIC,
+            version: VERSION,
+            run_id,
+            slot_bytes: slot_bytes as u64,
+            generation: twice(0),
+        };
+        let old = match (file.metadata()?.len(), read_head(&file)?) {
+            (0, _) => {
+                file.set_len(length as u64)?;
+                old
+            }
+            // Its maker died before it had any state in it.
+            (bytes, Some(head)) if bytes == length as u64 && head.magic == 0 => old,
+            (bytes, Some(head)) if bytes == length as u64 && head.is_as(&old) => head,
+            // Beginning anew would undo what everybody has seen.
+            _ => return Err(damaged("it is damaged, or of another run or version")),
+        };
+        // Nobody would listen to a world of a generation that was before.
+        let before = old.generation as u32;
+        let generation = before.checked_add(1);
+        let generation = generation.filter(|_| twice(before) == old.generation);
+        let generation = generation.ok_or_else(|| damaged("its generation is damaged"))?;
         // SAFETY: only processes of this user can open the file, and of these only the one world
         // process of the run does; nobody shortens it while the run goes on.
         let map = unsafe { MmapMut::map_mut(&file)? };
-        let generation = old.map_or(0, |head| head.generation) + 1;
         let mut journal = Self {
             map,
             copied: Vec::with_capacity(rooms.iter().copied().max().unwrap_or(0)),
@@ -180,14 +199,17 @@ impl Journal {
         };
         let mut found: Vec<Found> = (0..2).filter_map(|slot| journal.read_slot(slot)).collect();
         found.sort_by_key(|(tick, _)| std::cmp::Reverse(*tick));
+        if before == 0 && !found.is_empty() {
+            return Err(damaged("its beginning is damaged"));
+        }
         let head = Head {
-            magic: MAGIC,
-            version: VERSION,
-            generation,
-            run_id,
-            slot_bytes: slot_bytes as u64,
+            generation: twice(generation),
+            ..old
         };
-        journal.put(0, head.as_bytes());
+        // Each word at once, and the first last: with it the file counts.
+        for (at, word) in head.as_bytes().chunks(LENGTH).enumerate().rev() {
+            journal.put(at * LENGTH, word);
+        }
         Ok((journal, found))
     }
 
@@ -396,16 +418,21 @@ impl Journal {
         room.get(..usize::try_from(length).ok()?.checked_add(LENGTH)?)
     }
 
+    /// What is in a slot, whole or not; nothing while it is written.
     fn read_slot(&self, slot: usize) -> Option<Found> {
         let at = self.slot_at(slot);
         let word = |at: usize| u64::read_from_bytes(&self.map[at..at + 8]).ok();
-        let (tick, parts) = (word(at)?, usize::try_from(word(at + 8)?).ok()?);
-        (1..=self.slots.places.len())
-            .contains(&parts)
-            .then_some(())?;
+        let (tick, parts) = (word(at)?, word(at + 8)?);
+        if parts == 0 {
+            return None;
+        }
         let mut state = Vec::new();
         for part in 0..parts {
-            state.extend_from_slice(self.part(slot, part)?);
+            let part = usize::try_from(part).ok();
+            match part.and_then(|part| self.part(slot, part)) {
+                Some(bytes) => state.extend_from_slice(bytes),
+                None => return Some((tick, Vec::new())),
+            }
         }
         Some((tick, state))
     }
@@ -423,6 +450,15 @@ impl Journal {
 
 const fn index_of(sequence: u64) -> usize {
     INDEX + (sequence % KEPT) as usize * size_of::<Place>()
+}
+
+/// A generation, such that one that is damaged is seen to be.
+fn twice(generation: u32) -> u64 {
+    u64::from(generation) | u64::from(!generation) << 32
+}
+
+fn damaged(what: &'static str) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, what)
 }
 
 fn read_head(file: &File) -> io::Result<Option<Head>> {
@@ -443,212 +479,10 @@ fn checksum(entry: &Entry, motions: &[u8], events: &[u8]) -> u64 {
     hash.finish()
 }
 
+// Where they lie is said since this file is compiled into a fuzz target, too.
 #[cfg(test)]
-mod tests {
-    use std::fs;
-
-    use super::*;
-    use shm_types::{EventKind, zeroed};
-
-    /// Three parts: one that is other in every tick, one in every third, one never.
-    const ROOMS: [usize; 3] = [48, 40, 24];
-
-    impl Journal {
-        /// Of what is written, as much as is before the writer's death.
-        pub(super) fn as_far_as_it_lives<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
-            let left = self.dies_after.unwrap_or(bytes.len()).min(bytes.len());
-            self.dies_after = self.dies_after.map(|bytes| bytes - left);
-            &bytes[..left]
-        }
-    }
-
-    fn framed(bytes: &[u8]) -> Vec<u8> {
-        [&(bytes.len() as u64).to_le_bytes(), bytes].concat()
-    }
-
-    /// Part `part` of the state at `tick`.
-    fn part(part: usize, tick: u64) -> Vec<u8> {
-        match part {
-            0 => framed(&tick.to_le_bytes().repeat(1 + tick as usize % 4)),
-            1 => framed(&vec![(tick / 3) as u8; 1 + (tick / 3) as usize % 30]),
-            _ => framed(b"always the same"),
-        }
-    }
-
-    fn state(tick: u64) -> Vec<u8> {
-        [0, 1, 2].map(|number| part(number, tick)).concat()
-    }
-
-    fn open(path: &Path) -> (Journal, Vec<Found>) {
-        Journal::open(path, 7, &ROOMS).unwrap()
-    }
-
-    fn batch(sequence: u64, events: usize) -> Box<MotionBatch> {
-        let mut batch: Box<MotionBatch> = zeroed();
-        (batch.sequence, batch.tick) = (sequence, sequence + 1);
-        batch.event_count = events as u32;
-        for event in &mut batch.events[..events] {
-            *event = EventRecord::new(EventKind::Epoch, sequence);
-        }
-        batch
-    }
-
-    /// Hands over all parts, or those that are not as the tick before.
-    fn commit_parts(journal: &mut Journal, tick: u64, batch: Option<&MotionBatch>, all: bool) {
-        let save = |put: &mut dyn FnMut(usize, &[u8])| {
-            for number in [1, 2, 0] {
-                let bytes = part(number, tick);
-                if all || bytes != part(number, tick - 1) {
-                    put(number, &bytes);
-                }
-            }
-        };
-        journal.commit(tick, batch, save).unwrap();
-    }
-
-    fn commit(journal: &mut Journal, tick: u64, events: usize) {
-        let led = tick.checked_sub(1).map(|sequence| batch(sequence, events));
-        let all = journal.slots.parts == 0;
-        commit_parts(journal, tick, led.as_deref(), all);
-    }
-
-    fn events_of(journal: &Journal, sequence: u64) -> Option<(u32, u64)> {
-        let mut out: Box<MotionBatch> = zeroed();
-        let found = journal.read(sequence, &mut out);
-        found.then(|| (out.event_count, out.events[0].time_ns))
-    }
-
-    #[test]
-    fn a_process_that_comes_after_finds_the_newest_state_and_what_led_to_it() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("journal");
-        {
-            let (mut journal, found) = open(&path);
-            assert!(found.is_empty());
-            for tick in 0..100 {
-                commit(&mut journal, tick, 3);
-            }
-        }
-        let (mut journal, found) = open(&path);
-        assert_eq!(journal.generation(), 2);
-        let ticks: Vec<u64> = found.iter().map(|(tick, _)| *tick).collect();
-        assert_eq!(ticks, [99, 98]);
-        assert!(found[0].1 == state(99) && found[1].1 == state(98));
-        journal.go_on_from(99);
-        assert_eq!(journal.kept_from(0), 0);
-        assert_eq!(events_of(&journal, 98), Some((3, 98)));
-        assert_eq!(events_of(&journal, 99), None);
-        commit(&mut journal, 100, 1);
-        assert_eq!(events_of(&journal, 99), Some((1, 99)));
-        let (_, found) = Journal::open(&path, 8, &ROOMS).unwrap();
-        assert!(found.is_empty(), "of another run");
-    }
-
-    #[test]
-    fn whatever_byte_its_writer_dies_at_one_state_is_whole() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("journal");
-        let (mut before, mut after) = (0, 0);
-        // Part 1 is other at ticks 6 and 9: written in the first tick, copied in the next.
-        for last in 5..=8 {
-            for dies_after in 0.. {
-                let (mut journal, _) = open(&path);
-                for tick in 0..=last {
-                    commit(&mut journal, tick, 1);
-                }
-                journal.dies_after = Some(dies_after);
-                commit(&mut journal, last + 1, 1);
-                let lives = journal.dies_after != Some(0);
-                drop(journal);
-                let (mut journal, found) = open(&path);
-                let newest = found[0].0;
-                assert!(newest == last || newest == last + 1, "{newest}");
-                assert!(found.iter().all(|(tick, bytes)| *bytes == state(*tick)));
-                if newest == last {
-                    before += 1;
-                } else {
-                    after += 1;
-                }
-                journal.go_on_from(newest);
-                assert_eq!(events_of(&journal, newest - 1), Some((1, newest - 1)));
-                for tick in newest + 1..newest + 3 {
-                    commit(&mut journal, tick, 1);
-                    let found: Vec<_> = (0..2).filter_map(|s| journal.read_slot(s)).collect();
-                    let newest = found.iter().find(|(of, _)| *of == tick).unwrap();
-                    assert!(newest.1 == state(tick), "{tick}");
-                    assert!(found.iter().all(|(of, bytes)| *bytes == state(*of)));
-                }
-                if lives {
-                    assert_eq!(newest, last + 1, "it was not killed any more");
-                    break;
-                }
-                fs::remove_file(&path).unwrap();
-            }
-            fs::remove_file(&path).unwrap();
-        }
-        assert!(before > 300 && after >= 4, "{before} and {after}");
-    }
-
-    #[test]
-    fn a_batch_that_is_torn_is_none() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("journal");
-        let (mut journal, _) = open(&path);
-        commit(&mut journal, 0, 0);
-        commit(&mut journal, 1, 2);
-        journal.keep(&batch(1, 2));
-        let place = *journal.kept.back().unwrap();
-        let at = RING_AT + place.offset as usize + size_of::<Entry>();
-        journal.put(at, &[0xff]);
-        drop(journal);
-        let (mut journal, found) = open(&path);
-        assert_eq!(found[0].0, 1);
-        journal.go_on_from(2);
-        assert_eq!(events_of(&journal, 1), None, "its checksum is wrong");
-        journal.go_on_from(1);
-        assert_eq!(events_of(&journal, 0), Some((2, 0)));
-    }
-
-    #[test]
-    fn a_journal_of_another_size_is_refused() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("journal");
-        drop(open(&path));
-        let other = Journal::open(&path, 7, &[24, 24, 24]);
-        assert_eq!(
-            other.err().map(|error| error.kind()),
-            Some(io::ErrorKind::InvalidData)
-        );
-    }
-
-    #[test]
-    fn what_is_needed_is_not_lost_while_there_is_room() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("journal");
-        let (mut journal, _) = open(&path);
-        let mut tick = 0;
-        while journal.has_room(0) {
-            commit(&mut journal, tick, 700);
-            tick += 1;
-        }
-        assert!(tick > 100);
-        assert_eq!(journal.kept_from(tick), 0, "up to here all is kept");
-        // What is durable may go.
-        let durable = tick / 2;
-        assert!(journal.has_room(durable));
-        for _ in 0..40 {
-            commit(&mut journal, tick, 700);
-            tick += 1;
-        }
-        assert!(journal.kept_from(tick) <= durable);
-        assert_eq!(events_of(&journal, durable), Some((700, durable)));
-        let (mut again, _) = open(&path);
-        again.go_on_from(tick - 1);
-        assert_eq!(events_of(&again, durable), Some((700, durable)));
-        assert!(commit_too_long(&mut again).is_err());
-    }
-
-    fn commit_too_long(journal: &mut Journal) -> io::Result<()> {
-        journal.commit(0, None, |put| put(1, &[0; 41]))
-    }
-}
+#[path = "journal/damage.rs"]
+mod damage;
+#[cfg(test)]
+#[path = "journal/tests.rs"]
+mod tests;

@@ -89,7 +89,7 @@ pub fn tell(run: &str, told: &Told) -> Result<Answered, TellError> {
             let tick = reply.result().map_err(TellError::Refused)?;
             return Ok(Answered {
                 tick,
-                time_ns: tick * options.settings.tick_ns,
+                time_ns: tick.saturating_mul(options.settings.tick_ns),
                 objects: run.objects,
                 run: run.name,
             });

@@ -74,6 +74,10 @@ impl Ticker {
     }
 }
 
+/// Periods that one message can be for: further back there was no run, or no clock that could be
+/// believed.
+const MOST_PERIODS: u64 = 100_000;
+
 /// What was due in each period of the world, and when it came: for times that no stall can hide,
 /// since every period it swallowed counts, from its own deadline.
 #[derive(Clone, Copy, Debug)]
@@ -95,11 +99,13 @@ impl Due {
     }
 
     /// At time `now_ns` there came what was published at `published_ns`: the lateness of each
-    /// period that this is for, the oldest first. Nothing is due before the first.
+    /// period that this is for, the oldest first. Nothing is due before the first. A stamp that is
+    /// no past time counts as now, and none leads back.
     pub(crate) fn came(&mut self, published_ns: u64, now_ns: u64) -> impl Iterator<Item = u64> {
-        let period = published_ns / self.period_ns;
-        let from = self.next.unwrap_or(period).min(period + 1);
-        self.next = Some(period + 1);
+        let period = published_ns.min(now_ns) / self.period_ns;
+        let next = self.next.unwrap_or(period);
+        let from = next.max((period + 1).saturating_sub(MOST_PERIODS));
+        self.next = Some(next.max(period + 1));
         let Self {
             period_ns,
             phase_ns,
@@ -133,6 +139,17 @@ mod tests {
         // Had before it was due, and the same again.
         assert_eq!(came(1_500, 1_510), [0]);
         assert_eq!(came(1_500, 1_520), [0; 0]);
+    }
+
+    #[test]
+    fn a_stamp_that_cannot_be_is_soon_over() {
+        let mut due = Due::new(100, 30);
+        let mut came = |published, now| due.came(published, now).count();
+        assert_eq!(came(u64::MAX, 1_031), 1, "as if it were of now");
+        assert_eq!(came(0, 1_135), 0);
+        assert_eq!(came(1_205, 1_235), 2);
+        let years = 1 << 60;
+        assert_eq!(came(years, years), MOST_PERIODS as usize);
     }
 
     #[test]

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use shm_types::Counts;
 use shm_types::capacity::{LAYOUT_VERSION, MAX_OBJECTS};
 
+use crate::domain::runs::prefix;
 use crate::domain::{DomainError, RUN_FILE, SCENARIO_FILE, file_error, put};
 use crate::options::{Recovery, Role, RunOptions};
 
@@ -89,13 +90,18 @@ impl RunFile {
             path: path.clone(),
             reason,
         };
-        let run: Self = serde_json::from_str(&text).map_err(|e| foreign(e.to_string()))?;
+        let mut run: Self = serde_json::from_str(&text).map_err(|e| foreign(e.to_string()))?;
         if run.layout_version != LAYOUT_VERSION {
             return Err(foreign(format!(
                 "its messages have layout {}, this program's {LAYOUT_VERSION}",
                 run.layout_version
             )));
         }
+        // What is removed once a run is dead follows from these.
+        if run.prefix != prefix(&run.id) {
+            return Err(foreign(format!("{:?} is not its prefix", run.prefix)));
+        }
+        run.root = directory.to_owned();
         Ok(run)
     }
 

@@ -120,6 +120,20 @@ fn a_run_of_another_version_is_refused() {
 }
 
 #[test]
+fn what_is_removed_later_does_not_hang_on_what_a_file_says() {
+    let runs = runs();
+    let (directory, mut run) = create(runs.path(), None).unwrap();
+    run.root = "/home".into();
+    directory.write_run(&run).unwrap();
+    let read = RunFile::read(directory.path()).unwrap();
+    assert_eq!(read.root, directory.path());
+    run.prefix = String::new();
+    directory.write_run(&run).unwrap();
+    let error = RunFile::read(directory.path()).unwrap_err();
+    assert!(matches!(error, DomainError::Foreign { .. }), "{error}");
+}
+
+#[test]
 fn roots_and_prefixes_stay_short_enough_for_sockets() {
     let path = default_path().join("0123abcd");
     let length = path.as_os_str().len() + prefix("0123abcd").len();

@@ -136,9 +136,12 @@ impl Follower {
         Ok(None)
     }
 
-    /// Whether a snapshot is of this run and no older than what came before it.
+    /// Whether a snapshot is of this run and no older than what came before it. The rest of it is
+    /// checked by whoever uses it; how the run stands is used here.
     fn goes_on(&self, seat: &Seat, header: &SnapshotHeader) -> bool {
-        let is_of_run = header.magic == MAGIC && header.run_id == seat.run.id_number();
+        let is_of_run = header.magic == MAGIC
+            && header.run_id == seat.run.id_number()
+            && Outcome::decode(header.outcome).is_ok();
         let now = (header.generation, header.tick);
         is_of_run && now > (self.generation, self.tick) && header.tick >= self.tick
     }

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use planner::{Planner, PlannerInput};
 use shm_types::{
-    Checked, ConstraintTable, Counters, HardAnswer, HardRequest, PlannerReport, Schedule,
+    Checked, ConstraintTable, Counters, HardAnswer, HardRequest, PlannerReport, Schedule, Validate,
     WorldSnapshot,
 };
 
@@ -160,7 +160,10 @@ impl Shell {
     /// seen.
     fn receive(&mut self, seat: &Seat, tick: u64) -> Result<(), RoleError> {
         while let Some(question) = self.server.receive()? {
-            Checked::new(&*question, seat.counts()).map_err(refused("hard"))?;
+            // One that is none is not answered; who asks in earnest asks again.
+            if question.validate(seat.counts()).is_err() {
+                continue;
+            }
             self.give_up_old(question.robot);
             self.questions.push(Held {
                 question,

@@ -19,7 +19,7 @@ use std::time::Duration;
 
 use shm_types::capacity::MAX_ROBOTS;
 use shm_types::{Activity, ControlRequest, MotionBatch, Outcome, SnapshotHeader, WorldSnapshot};
-use world::{World, WorldInput};
+use world::{CheckpointError, World, WorldInput};
 
 use crate::clock;
 use crate::histograms::Timed;
@@ -82,6 +82,7 @@ fn restore(seat: &mut Seat, found: &[Found]) -> Result<Option<World>, RoleError>
     let mut why = None;
     for (_, bytes) in found {
         let Some(scenario_hash) = World::scene_of(bytes) else {
+            why = Some(CheckpointError::Damaged);
             continue;
         };
         if scenario_hash != seat.scene.hash {
@@ -269,7 +270,7 @@ impl Shell {
         let input = WorldInput {
             commands: &commands[..self.world.robots()],
             planner: self.ears.report()?,
-            table: self.ears.table()?,
+            table: self.ears.table(),
             schedule: self.ears.schedule(),
             control: &self.control,
             change: change.as_ref(),

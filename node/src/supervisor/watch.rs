@@ -134,7 +134,7 @@ impl Watch {
                 *pulse = Pulse {
                     role,
                     incarnation: match role {
-                        Role::World => generation + 1,
+                        Role::World => generation.saturating_add(1),
                         _ => incarnation,
                     },
                     ready: false,

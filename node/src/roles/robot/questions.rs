@@ -6,12 +6,12 @@
 
 use std::collections::VecDeque;
 
-use shm_types::{Checked, HardAnswer, HardRequest};
+use shm_types::{HardAnswer, HardRequest, Validate};
 
 use crate::calls::{Call, Client, OPEN_CALLS};
 use crate::clock;
 use crate::histograms::Timed;
-use crate::roles::{RoleError, Seat, refused};
+use crate::roles::{RoleError, Seat};
 
 /// A robot's questions, and the newest answer.
 pub(super) struct Questions {
@@ -46,9 +46,11 @@ impl Questions {
             };
             match call.answer()? {
                 Some(answer) => {
-                    Checked::new(&answer, seat.counts()).map_err(refused("hard"))?;
-                    seat.record_since(Timed::HardRoundTrip, asked_ns);
-                    self.early = Some(answer);
+                    // One that is none is as good as lost: the robot asks again.
+                    if answer.validate(seat.counts()).is_ok() {
+                        seat.record_since(Timed::HardRoundTrip, asked_ns);
+                        self.early = Some(answer);
+                    }
                 }
                 None => self.open.push_back((asked_ns, call)),
             }

@@ -6,7 +6,8 @@
 //! Not responsible for: what any of it means to the world (crate `world`).
 //!
 //! The recorder takes part by a window: the world runs ahead of it by so many batches, then it
-//! waits. A message that is no legal one counts as lost.
+//! waits. A message that is no legal one is as good as lost: whoever sends such does not take the
+//! world along.
 
 use shm_types::capacity::MAX_ROBOTS;
 use shm_types::{
@@ -103,16 +104,18 @@ impl Ears {
         while let Some(command) = self.commands.receive()? {
             self.hear(&command);
         }
-        if let Some(report) = self.planner.receive()? {
-            Checked::new(&*report, self.counts).map_err(refused("planner"))?;
+        if let Some(report) = self.planner.receive()?
+            && report.validate(self.counts).is_ok()
+        {
             self.report = Some(*report);
         }
         self.tables.receive(0)?;
         if let Some(schedules) = &mut self.schedules {
             schedules.receive(0)?;
         }
-        if let Some(report) = self.recorder.receive()? {
-            Checked::new(&*report, self.counts).map_err(refused("recorder"))?;
+        if let Some(report) = self.recorder.receive()?
+            && report.validate(self.counts).is_ok()
+        {
             self.recorded = Some(*report);
         }
         while self.requests.len() < MOST_REQUESTS
@@ -156,7 +159,8 @@ impl Ears {
             return;
         }
         if robot.heard {
-            self.lost_commands += command.sequence - robot.command.sequence - 1;
+            let lost = command.sequence - robot.command.sequence - 1;
+            self.lost_commands = self.lost_commands.saturating_add(lost);
         }
         robot.heard = true;
         robot.command = *command;
@@ -302,12 +306,9 @@ impl Ears {
             .transpose()
     }
 
-    /// The newest constraint table.
-    pub(super) fn table(&self) -> Result<Option<Checked<'_, ConstraintTable>>, RoleError> {
-        let newest = self.tables.newest();
-        newest
-            .map(|kept| kept.checked().map_err(refused("constraints")))
-            .transpose()
+    /// The newest constraint table, if it is a legal one.
+    pub(super) fn table(&self) -> Option<Checked<'_, ConstraintTable>> {
+        self.tables.newest()?.checked().ok()
     }
 
     /// The newest schedule.

@@ -2,9 +2,9 @@
 //! header.
 //!
 //! Responsible for: sharing executions among targets and threads. Not responsible for: the targets
-//! (`sim/tests/hostile/targets.rs`).
+//! (crate `hostile`).
 //!
-//! `cargo run --release -p sim --example hostile EXECUTIONS [SEED [THREADS]]`. A panic ends it, with the tape that led there.
+//! `cargo run --release -p hostile --example hostile EXECUTIONS [SEED [THREADS]]`. A panic ends it, with the tape that led there.
 
 #![expect(
     clippy::expect_used,
@@ -13,14 +13,11 @@
     reason = "a loop that counts, and ends where something is wrong"
 )]
 
-#[path = "../tests/hostile/targets.rs"]
-mod targets;
-
 use std::time::Instant;
 
+use hostile::{Got, Target, Targets};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use targets::{Got, Target, Targets};
 
 /// Bytes of a tape.
 const TAPE: usize = 64;
@@ -28,12 +25,11 @@ const TAPE: usize = 64;
 /// Of 1000 executions so many are of this target: files take longest.
 const fn share(target: Target) -> u64 {
     match target {
-        Target::Scenario => 5,
-        Target::Trace => 10,
-        Target::Journal => 65,
-        Target::Schedule | Target::Table => 100,
-        Target::Snapshot => 120,
-        Target::Control | Target::Command => 300,
+        Target::Scenario | Target::Trace => 10,
+        Target::Snapshot | Target::Question => 40,
+        Target::Control | Target::Journal | Target::Schedule | Target::Table => 100,
+        Target::Command | Target::Motion => 150,
+        Target::Report => 200,
     }
 }
 
@@ -72,7 +68,7 @@ fn main() {
 
 fn feed(target: Target, seed: u64, count: u64) -> [u64; 3] {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut targets = Targets::new();
+    let targets = Targets::new();
     let mut got = [0; 3];
     for execution in 0..count {
         let tape: [u8; TAPE] = rng.random();
