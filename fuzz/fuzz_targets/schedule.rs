@@ -1,0 +1,5 @@
+#![no_main]
+
+use hostile::Target;
+
+libfuzzer_sys::fuzz_target!(|tape: &[u8]| rearrange_fuzz::run(Target::Schedule, tape));
