@@ -4,10 +4,10 @@
 //! Responsible for: sharing executions among targets and threads. Not responsible for: the targets
 //! (crate `hostile`).
 //!
-//! `cargo run --release -p hostile --example hostile EXECUTIONS [SEED [THREADS]]`. A panic ends it, with the tape that led there.
+//! `cargo run --release -p hostile --example hostile EXECUTIONS [SEED [THREADS]]`. A panic ends it,
+//! with the tape that led there.
 
 #![expect(
-    clippy::expect_used,
     clippy::print_stdout,
     clippy::print_stderr,
     reason = "a loop that counts, and ends where something is wrong"

@@ -3,8 +3,6 @@
 //!
 //! More of the same: `cargo run --release -p hostile --example hostile 10000000`, and `fuzz/`.
 
-#![expect(clippy::expect_used, reason = "a test may fail")]
-
 use std::fs;
 use std::path::Path;
 
