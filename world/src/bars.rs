@@ -201,6 +201,7 @@ fn stands(robot: &Robot) -> bool {
 mod tests {
     use shm_types::{Claim, FailureCause, NONE};
 
+    use super::{Bars, Parked, Vec2};
     use crate::testing::{BELOW, Bench, room};
 
     const ROBOTS: [[f64; 2]; 3] = [[1.0, 1.0], [4.0, 1.0], [8.0, 1.0]];
@@ -316,5 +317,23 @@ mod tests {
         bench.drive(1, &[[4.5, 1.0]]);
         bench.steps(5);
         assert!(is_barred(&bench, 0, 1));
+    }
+    #[test]
+    fn a_bar_names_robots_and_tasks_that_there_are() {
+        let is_sound = |[robot, task, blocker]: [usize; 3]| {
+            let mut bars = Bars::new(3, 2);
+            let at = Vec2::default();
+            bars.parked.push(Parked {
+                robot,
+                task,
+                blocker,
+                at,
+            });
+            bars.is_sound(3, 2)
+        };
+        assert!(is_sound([2, 1, 2]), "the last of each");
+        for beyond in [[3, 1, 2], [2, 2, 2], [2, 1, 3]] {
+            assert!(!is_sound(beyond), "{beyond:?}");
+        }
     }
 }

@@ -110,9 +110,8 @@ impl Grants {
             && has_room(&robots[i])
         {
             let from = robots[i].grant_end();
-            let length_m = (to - from).norm();
             let field = self.field(around, robots);
-            let farthest = farthest(from, to, length_m, self.tick_m, |end| {
+            let farthest = farthest(from, to, f64::INFINITY, self.tick_m, |end| {
                 field.check_in_space(i, from, end)
             });
             let Some((end, whole)) = farthest.end else {

@@ -173,9 +173,10 @@ mod tests {
     use scene::{Method, Settings};
     use shm_types::{
         Action, ControlKind, EventKind, Grip, NONE, Outcome, Point, Refusal, RobotSchedule,
-        Schedule, TaskStatus, Verdict, zeroed,
+        Schedule, StateHash, TaskStatus, Verdict, zeroed,
     };
 
+    use super::Schedules;
     use crate::testing::{BELOW, Bench, room};
 
     /// Object 0 stands where robot 0 may grasp it, object 1 at its goal, robot 1 beside it.
@@ -543,5 +544,21 @@ mod tests {
             let reason = bench.world.reason(&bench.scene).unwrap();
             assert!(reason.contains(words), "{reason}");
         }
+    }
+    #[test]
+    fn the_version_in_force_and_the_one_judged_last_are_state() {
+        let hash = |in_force: u32, judged: u32| {
+            let mut hash = StateHash::new();
+            let refused = None;
+            let schedules = Schedules {
+                in_force,
+                judged,
+                refused,
+            };
+            schedules.hash_into(&mut hash);
+            hash.finish()
+        };
+        let [nothing, refused, in_force] = [hash(0, 0), hash(0, 1), hash(1, 1)];
+        assert!(nothing != refused && refused != in_force && nothing != in_force);
     }
 }

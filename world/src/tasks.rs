@@ -139,7 +139,7 @@ mod tests {
     use scene::Settings;
     use shm_types::{EventKind, FailureCause, Grip, NONE, Phase, TaskStatus};
 
-    use crate::testing::{BELOW, Bench, papers, room};
+    use crate::testing::{BELOW, Bench, papers, room, room_text};
 
     const OBJECTS: [[[f64; 2]; 2]; 2] = [[[1.0, 1.45], [2.0, 1.45]], [[5.0, 3.0], [5.0, 5.0]]];
 
@@ -262,5 +262,23 @@ mod tests {
         assert_eq!(bench.world.counters().task_failures, 0);
         assert_eq!((bench.header().epoch, bench.robot(0).task), (1, 0));
         bench.grip(0, Grip::Keep);
+    }
+    #[test]
+    fn who_is_on_the_way_to_an_object_keeps_it_when_its_goal_is_taken() {
+        let objects = [[[1.0, 1.45], [2.0, 1.45]], [[8.0, 1.45], [8.0, 4.0]]];
+        let kind = "[[objects]]\nkind = \"crate\"\n";
+        let text = room_text(&[[1.0, 1.0], [8.0, 1.0]], &objects, BELOW, "");
+        let text = text.replace("[[objects]]\n", kind);
+        let mut bench = Bench::new(scene::parse(&text, "kinds.toml").unwrap());
+        bench.claim(0, 0);
+        bench.claim(1, 1);
+        bench.step();
+        bench.grasp(0);
+        bench.drive(0, &[[1.0, 3.55], [8.0, 3.55]]);
+        bench.release(0);
+        assert_eq!(bench.object(0).status, TaskStatus::Done.code());
+        assert_eq!(bench.object(1).goal, shm_types::Point::new(2.0, 1.45));
+        assert_eq!(bench.object(1).status, TaskStatus::Claimed.code());
+        assert_eq!(bench.object(1).claimed_by, 1);
     }
 }

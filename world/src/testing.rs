@@ -23,6 +23,16 @@ pub(crate) fn room(
     grasp: [f64; 2],
     more: &str,
 ) -> Scene {
+    scene::parse(&room_text(homes, objects, grasp, more), "bench.toml").unwrap()
+}
+
+/// The scenario file of such a room.
+pub(crate) fn room_text(
+    homes: &[[f64; 2]],
+    objects: &[[[f64; 2]; 2]],
+    grasp: [f64; 2],
+    more: &str,
+) -> String {
     let mut text = format!(
         "name = \"bench\"\n[robot]\nshape = {{ box = [0.5, 0.5] }}\nspeed = 0.5\n{more}\n\
          [object]\nshape = {{ box = [0.4, 0.4] }}\ngrasp = {grasp:?}\n\
@@ -40,7 +50,7 @@ pub(crate) fn room(
     for [start, goal] in objects {
         text += &format!("[[objects]]\nstart = {start:?}\ngoal = {goal:?}\n");
     }
-    scene::parse(&text, "bench.toml").unwrap()
+    text
 }
 
 /// The default grasp of these objects: the robot below, touching.
