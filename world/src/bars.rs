@@ -318,6 +318,7 @@ mod tests {
         bench.steps(5);
         assert!(is_barred(&bench, 0, 1));
     }
+
     #[test]
     fn a_bar_names_robots_and_tasks_that_there_are() {
         let is_sound = |[robot, task, blocker]: [usize; 3]| {
