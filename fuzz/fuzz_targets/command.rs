@@ -1,3 +1,5 @@
+//! Robots' commands, as the world reads them.
+
 #![no_main]
 
 use hostile::Target;

@@ -1,3 +1,5 @@
+//! Requests of control, as the world reads them.
+
 #![no_main]
 
 use hostile::Target;

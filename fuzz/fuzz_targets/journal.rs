@@ -1,3 +1,5 @@
+//! The world's saved state, as a world that is started again reads it.
+
 #![no_main]
 
 use hostile::Target;

@@ -1,7 +1,7 @@
-#![no_main]
-
 //! The file of the world's journal. The process shell (crate `node`) would bring iceoryx2 along, so its
 //! two files are compiled in here.
+
+#![no_main]
 
 #[path = "../../node/src/journal/damage.rs"]
 mod damage;

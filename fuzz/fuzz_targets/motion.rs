@@ -1,3 +1,5 @@
+//! Batches of motion, as the recorder reads them.
+
 #![no_main]
 
 use hostile::Target;

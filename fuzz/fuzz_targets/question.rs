@@ -1,3 +1,5 @@
+//! Robots' questions and the answers, as planner and robots read them.
+
 #![no_main]
 
 use hostile::Target;

@@ -1,3 +1,5 @@
+//! The planner's reports, as the world reads them.
+
 #![no_main]
 
 use hostile::Target;

@@ -1,3 +1,5 @@
+//! The text of scenario files.
+
 #![no_main]
 
 use hostile::Target;

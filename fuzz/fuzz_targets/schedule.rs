@@ -1,3 +1,5 @@
+//! Schedules, as world and robots read them.
+
 #![no_main]
 
 use hostile::Target;

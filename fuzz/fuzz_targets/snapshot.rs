@@ -1,3 +1,5 @@
+//! The world's snapshots, as robots and planner read them.
+
 #![no_main]
 
 use hostile::Target;

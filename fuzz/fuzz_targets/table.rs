@@ -1,3 +1,5 @@
+//! Constraint tables, as world and robots read them.
+
 #![no_main]
 
 use hostile::Target;

@@ -1,3 +1,5 @@
+//! Traces, as the checker and a recorder that goes on read them.
+
 #![no_main]
 
 use hostile::Target;
