@@ -17,15 +17,7 @@ const COUNTS: Counts = Counts {
 };
 
 fn snapshot() -> Box<WorldSnapshot> {
-    let mut snapshot: Box<WorldSnapshot> = zeroed();
-    snapshot.header = SnapshotHeader {
-        robot_count: COUNTS.robots,
-        object_count: COUNTS.objects,
-        ..SnapshotHeader::default()
-    };
-    snapshot.robots.fill(RobotState::default());
-    snapshot.objects.fill(ObjectState::default());
-    snapshot
+    crate::snapshot(COUNTS)
 }
 
 fn hash(snapshot: &WorldSnapshot) -> u64 {

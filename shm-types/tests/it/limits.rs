@@ -6,8 +6,8 @@ use shm_types::capacity::{MAX_ANSWER_BYTES, MAX_CHANGES, MAX_CONSTRAINTS, MAX_RO
 use shm_types::{
     BodyKind, ChangeKind, Constraint, ConstraintKind, ConstraintTable, ControlKind, ControlReply,
     ControlRequest, Counts, EventKind, EventRecord, HardAnswer, HardRequest, Invalid, MotionBatch,
-    MotionRecord, NONE, ObjectState, PlannerReport, Point, RecorderReport, RobotState, RoleKind,
-    Schedule, SnapshotHeader, StateHash, Validate, Versioned, WorldSnapshot, zeroed,
+    MotionRecord, NONE, ObjectState, PlannerReport, Point, RecorderReport, RoleKind, Schedule,
+    StateHash, Validate, Versioned, WorldSnapshot, zeroed,
 };
 use zerocopy::{FromZeros, IntoBytes};
 
@@ -20,15 +20,7 @@ const COUNTS: Counts = Counts {
 const MOST_TICKS: u64 = 1 << 60;
 
 fn snapshot() -> Box<WorldSnapshot> {
-    let mut snapshot: Box<WorldSnapshot> = zeroed();
-    snapshot.header = SnapshotHeader {
-        robot_count: COUNTS.robots,
-        object_count: COUNTS.objects,
-        ..SnapshotHeader::default()
-    };
-    snapshot.robots.fill(RobotState::default());
-    snapshot.objects.fill(ObjectState::default());
-    snapshot
+    crate::snapshot(COUNTS)
 }
 
 /// A field of `message` that `set` sets may be anything up to `last`, and nothing just past it.
