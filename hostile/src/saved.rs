@@ -38,16 +38,8 @@ pub(crate) fn state(bench: &Bench, tape: &mut Tape<'_>) -> Got {
         Ok(mut world) => {
             // Nobody says that such a state is a safe one: only that one can go on from it.
             let mut motion: Box<MotionBatch> = zeroed();
-            let input = WorldInput {
-                commands: &[],
-                planner: None,
-                table: None,
-                schedule: None,
-                control: &[],
-                change: None,
-            };
             for _ in 0..TICKS {
-                world.step(&bench.scene, input, &mut motion);
+                world.step(&bench.scene, WorldInput::default(), &mut motion);
             }
             Got::Accepted
         }

@@ -28,8 +28,8 @@ use crate::settled::Overflow;
 use crate::state::{Object, Robot};
 use crate::track::Track;
 
-/// What one step of the world takes in.
-#[derive(Clone, Copy)]
+/// What one step of the world takes in; by default nothing.
+#[derive(Clone, Copy, Default)]
 pub struct WorldInput<'a> {
     /// The newest command of each robot, by robot; `None` for one never heard of. A command seen
     /// before does no harm.

@@ -16,7 +16,7 @@ use scene::{Scene, Settings};
 use shm_types::{MotionBatch, Validate, zeroed};
 use sim::Simulation;
 use tempfile::TempDir;
-use world::World;
+use world::{World, WorldInput};
 
 use super::{Found, INDEX, Journal, RING_AT, SLOTS_AT};
 
@@ -177,15 +177,7 @@ impl Left {
             assert!(good.any(|good| same(good)), "another batch");
         }
         assert!(journal.has_room(tick));
-        let input = world::WorldInput {
-            commands: &[],
-            planner: None,
-            table: None,
-            schedule: None,
-            control: &[],
-            change: None,
-        };
-        world.step(&self.scene, input, &mut batch);
+        world.step(&self.scene, WorldInput::default(), &mut batch);
         let tick = world.tick();
         let kept = journal.commit(tick, Some(&batch), |put| world.save_changed(put));
         kept.expect("room");

@@ -18,6 +18,8 @@ const COUNTS: Counts = Counts {
 
 /// No limit of a run: a tick, a time or an epoch past it is refused.
 const MOST_TICKS: u64 = 1 << 60;
+/// Nor a version.
+const MOST_VERSIONS: u64 = 1 << 31;
 
 fn snapshot() -> Box<WorldSnapshot> {
     crate::snapshot(COUNTS)
@@ -29,7 +31,7 @@ fn holds_to<M: Validate>(mut message: Box<M>, what: &str, last: u64, set: impl F
         set(&mut message, value);
         assert_eq!(message.validate(COUNTS), Ok(()), "{what} {value}");
     }
-    for value in [last + 1, last + 2, 2 * last + 2] {
+    for value in [last + 1, last + 2, last + last / 2 + 2] {
         set(&mut message, value);
         assert!(message.validate(COUNTS).is_err(), "{what} {value}");
     }
@@ -39,10 +41,22 @@ fn holds_to<M: Validate>(mut message: Box<M>, what: &str, last: u64, set: impl F
 fn snapshots_are_held_to_the_limits_of_a_run() {
     let (robots, objects) = (u64::from(COUNTS.robots), u64::from(COUNTS.objects));
     type Set = fn(&mut WorldSnapshot, u64);
-    let limits: [(&str, u64, Set); 8] = [
+    let limits: [(&str, u64, Set); 12] = [
         ("tick", MOST_TICKS, |s, to| s.header.tick = to),
         ("time", MOST_TICKS, |s, to| s.header.time_ns = to),
         ("epoch", MOST_TICKS, |s, to| s.header.epoch = to),
+        ("table", MOST_VERSIONS, |s, to| {
+            s.header.constraints_version = to as u32
+        }),
+        ("table of the epoch", MOST_VERSIONS, |s, to| {
+            s.header.epoch_constraints_version = to as u32
+        }),
+        ("schedule", MOST_VERSIONS, |s, to| {
+            s.header.schedule_version = to as u32
+        }),
+        ("scene", MOST_VERSIONS, |s, to| {
+            s.header.scene_version = to as u32
+        }),
         ("task", objects - 1, |s, to| s.robots[2].task = to as u32),
         ("held", objects - 1, |s, to| s.robots[0].holding = to as u32),
         ("holder", robots - 1, |s, to| {
