@@ -312,3 +312,96 @@ impl Scrambler<'_> {
         found
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+
+    use super::*;
+
+    const OTHERS: [[f64; 2]; 2] = [[1.0, 1.0], [2.5, 2.0]];
+
+    fn plans() -> impl Iterator<Item = (ChaCha8Rng, Plan)> {
+        (0..60).filter_map(|seed| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            Plan::random(&mut rng, 6_800, 3).map(|plan| (rng, plan))
+        })
+    }
+
+    fn units([x, y]: [f64; 2]) -> (i32, i32) {
+        let units = |metres: f64| (metres * f64::from(UNITS_PER_M)).round() as i32;
+        (units(x), units(y))
+    }
+
+    /// Whether a place lies in a rectangle that is so much wider on each side, the border included.
+    fn lies_in(rect: &Rect, by: i32, (x, y): (i32, i32)) -> bool {
+        rect[0] - by <= x && x <= rect[2] + by && rect[1] - by <= y && y <= rect[3] + by
+    }
+
+    #[test]
+    fn homes_are_clear_of_walls_and_of_the_way_through_a_doorway() {
+        let mut placed = 0;
+        for (mut rng, plan) in plans() {
+            let Some(homes) = place_homes(&mut rng, &plan, 4) else {
+                continue;
+            };
+            placed += 1;
+            let homes: Vec<_> = homes.into_iter().map(units).collect();
+            for (i, &home) in homes.iter().enumerate() {
+                let room = [0, 0, plan.size.0, plan.size.1];
+                assert!(lies_in(&room, -5, home), "{home:?} in {room:?}");
+                // Robots are 10 units wide: one at home, and one in the doorway.
+                assert!(!plan.walls.iter().any(|wall| lies_in(wall, 4, home)));
+                assert!(!plan.doors.iter().any(|door| lies_in(door, 9, home)));
+                let other =
+                    |other: &(i32, i32)| lies_in(&[home.0, home.1, home.0, home.1], 9, *other);
+                assert!(!homes[..i].iter().any(other));
+            }
+        }
+        assert!(placed > 20, "{placed}");
+    }
+
+    #[test]
+    fn crowded_places_are_in_doorways_or_beside_others() {
+        for (mut rng, plan) in plans() {
+            for _ in 0..50 {
+                let at = propose(&mut rng, &plan, &OTHERS, 1.0);
+                let in_doorway = plan.doors.iter().any(|door| lies_in(door, 4, at));
+                let is_beside = OTHERS.iter().any(|other| {
+                    let (x, y) = units(*other);
+                    lies_in(&[x, y, x, y], CROWD_REACH, at)
+                });
+                assert!(in_doorway || is_beside, "{at:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn objects_are_placed_clear_of_walls_homes_and_one_another() {
+        let options = GenerateOptions::default();
+        let mut placed = 0;
+        for (mut rng, plan) in plans() {
+            let Some(draft) = room(&mut rng, &plan, &options) else {
+                continue;
+            };
+            let Some(goals) = place_objects(&mut rng, &plan, &draft, &options, OBJECT) else {
+                continue;
+            };
+            placed += 1;
+            let goals: Vec<_> = goals.into_iter().map(units).collect();
+            for (i, &at) in goals.iter().enumerate() {
+                // Objects are 8 units wide, robots 10.
+                assert!(!plan.walls.iter().any(|wall| lies_in(wall, 3, at)));
+                let body = [at.0, at.1, at.0, at.1];
+                assert!(!goals[..i].iter().any(|other| lies_in(&body, 7, *other)));
+                assert!(
+                    !draft
+                        .homes
+                        .iter()
+                        .any(|home| lies_in(&body, 8, units(*home)))
+                );
+            }
+        }
+        assert!(placed > 20, "{placed}");
+    }
+}

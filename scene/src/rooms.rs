@@ -206,4 +206,24 @@ mod tests {
         }
         assert!(made > 40, "{made} plans");
     }
+
+    #[test]
+    fn a_wall_reaches_from_side_to_side_but_for_its_doorway() {
+        for seed in 0..60 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let size = (90, 80);
+            let Some(plan) = Plan::divided(&mut rng, size, 1) else {
+                continue;
+            };
+            let area = |r: &Rect| (r[2] - r[0]) * (r[3] - r[1]);
+            let door = plan.doors[0];
+            let covered: i32 = plan.walls.iter().chain([&door]).map(area).sum();
+            let (upright, flat) = ((door[2] - door[0]) * size.1, (door[3] - door[1]) * size.0);
+            assert!(
+                covered == upright || covered == flat,
+                "{:?}, {door:?}",
+                plan.walls
+            );
+        }
+    }
 }

@@ -216,4 +216,28 @@ mod tests {
             assert!(crate::parse(&text, "x").is_ok(), "{objects} {robots}");
         }
     }
+
+    #[test]
+    fn three_of_four_slots_are_taken_and_each_lies_at_an_aisle() {
+        for pods in [1, 12, 13, 60, 500, MAX_OBJECTS] {
+            let floor = Floor::of(pods);
+            let slots = floor.slots();
+            let rack = RACK.0 * RACK.1;
+            assert_eq!(slots.len(), floor.columns * floor.rows * rack);
+            // No more racks than it takes, but for the last row of them.
+            let needed = (pods * SLOTS).div_ceil(TAKEN).div_ceil(rack);
+            let racks = floor.columns * floor.rows;
+            assert!(
+                (needed..needed + floor.columns).contains(&racks),
+                "{pods}: {racks}"
+            );
+            for &(x, y) in &slots {
+                assert!(
+                    (1..floor.width() - 1).contains(&x) && (2..floor.height() - 2).contains(&y)
+                );
+                let beside = [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)];
+                assert!(beside.iter().any(|cell| !slots.contains(cell)), "{x}, {y}");
+            }
+        }
+    }
 }

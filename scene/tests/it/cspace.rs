@@ -2,7 +2,8 @@
 
 use proptest::prelude::*;
 use scene::{
-    ClassId, Connectivity, Draft, ObjectDraft, Occupancy, Scene, ShapeDraft, Vec2, WallDraft,
+    CONTACT_M, ClassId, Connectivity, Draft, Lattice, ObjectDraft, Occupancy, Scene, ShapeDraft,
+    Vec2, WallDraft,
 };
 
 use crate::geometry::shape;
@@ -65,6 +66,44 @@ fn scene() -> impl Strategy<Value = Scene> {
         })
 }
 
+/// Which cell to look at: any, one at the edge of the lattice, one beside an obstacle.
+#[derive(Clone, Copy, Debug)]
+enum Look {
+    Anywhere,
+    AtTheEdge(usize),
+    Beside(prop::sample::Index),
+}
+
+fn look() -> impl Strategy<Value = Look> {
+    prop_oneof![
+        Just(Look::Anywhere),
+        (0..4usize).prop_map(Look::AtTheEdge),
+        any::<prop::sample::Index>().prop_map(Look::Beside),
+    ]
+}
+
+impl Look {
+    /// A cell for two numbers from 0 to 1.
+    fn cell(self, lattice: &Lattice, obstacles: &[Vec2], (x, y): (f64, f64)) -> u32 {
+        let (width, height) = (f64::from(lattice.width), f64::from(lattice.height));
+        let (mut column, mut row) = (x * width, y * height);
+        match self {
+            Self::AtTheEdge(0) => column = 0.0,
+            Self::AtTheEdge(1) => column = width,
+            Self::AtTheEdge(2) => row = 0.0,
+            Self::AtTheEdge(_) => row = height,
+            Self::Beside(which) if !obstacles.is_empty() => {
+                let at = (*which.get(obstacles) - lattice.at(0)) / lattice.pitch_m;
+                let reach = 2.0 / lattice.pitch_m;
+                (column, row) = (at.x + (x - 0.5) * reach, at.y + (y - 0.5) * reach);
+            }
+            Self::Anywhere | Self::Beside(_) => {}
+        }
+        let within = |at: f64, count: f64| at.clamp(0.0, count - 1.0) as u32;
+        within(row, height) * lattice.width + within(column, width)
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
 
@@ -73,7 +112,7 @@ proptest! {
         scene in scene(),
         class in 0..2usize,
         obstacles in prop::collection::vec((shape(), 0.0..6.0f64, 0.0..3.0f64, -0.5..0.5f64, -0.5..0.5f64, any::<bool>()), 0..4),
-        cells in prop::collection::vec(any::<prop::sample::Index>(), 60),
+        looks in prop::collection::vec((look(), (0.0..1.0f64, 0.0..1.0f64)), 180),
     ) {
         let lattice = &scene.lattice;
         let mut space = Occupancy::new(&scene);
@@ -89,8 +128,10 @@ proptest! {
         let inside = |column: i32, row: i32| {
             (0..lattice.width as i32).contains(&column) && (0..lattice.height as i32).contains(&row)
         };
-        for index in cells {
-            let cell = index.index(lattice.len()) as u32;
+        let mut centres: Vec<Vec2> = obstacles.iter().map(|(_, x, y, ..)| Vec2::new(*x, *y)).collect();
+        centres.extend(scene.walls.iter().map(|(_, at)| *at));
+        for (look, at) in looks {
+            let cell = look.cell(lattice, &centres, at);
             let (column, row) = ((cell % lattice.width) as i32, (cell / lattice.width) as i32);
             let at = lattice.at(cell);
             prop_assert_eq!(space.is_free(cell), space.at_is_free(&scene, at));
@@ -233,4 +274,49 @@ fn a_thin_wall_between_free_points_is_seen() {
     let mut flood = scene::Flood::new(&scene);
     flood.run(&scene, &space, scene.homes[0]);
     assert!(!flood.reached_at(&scene, &space, scene.homes[1]));
+}
+
+#[test]
+fn a_point_is_on_the_lattice_within_half_a_contact_and_between_its_edges() {
+    let lattice = Scene::new(room([0.0, 0.0, 5.0, 3.4])).unwrap().lattice;
+    let last = lattice.len() as u32 - 1;
+    for cell in [0, lattice.width - 1, lattice.width, last - 1, last] {
+        let at = lattice.at(cell);
+        assert_eq!(lattice.cell(at), Some(cell));
+        for along in [Vec2::x(), -Vec2::x(), Vec2::y(), -Vec2::y()] {
+            assert_eq!(lattice.cell(at + along * CONTACT_M * 0.4), Some(cell));
+            assert_eq!(lattice.cell(at + along * CONTACT_M * 0.6), None);
+        }
+    }
+    for along in [Vec2::x(), Vec2::y()] {
+        assert_eq!(lattice.cell(lattice.at(0) - along * lattice.pitch_m), None);
+        assert_eq!(
+            lattice.cell(lattice.at(last) + along * lattice.pitch_m),
+            None
+        );
+    }
+}
+
+#[test]
+fn nobody_moves_in_or_out_of_the_room() {
+    let scene = Scene::new(room([0.0, 0.0, 4.0, 3.0])).unwrap();
+    let space = Occupancy::new(&scene);
+    let home = scene.homes[0];
+    for outside in [[-2.0, 0.5], [6.0, 0.5], [0.5, -2.0], [0.5, 5.0]].map(Vec2::from) {
+        assert!(!space.straight_is_free(&scene, home, outside));
+        assert!(!space.straight_is_free(&scene, outside, home));
+        assert!(!space.at_is_free(&scene, outside));
+    }
+}
+
+#[test]
+fn where_an_object_was_left_makes_the_lattice_less_than_exact_but_no_coarser() {
+    let mut draft = room([0.0, 0.0, 5.0, 3.4]);
+    draft.objects = vec![ObjectDraft::paper([1.0, 1.5], Some([4.0, 1.5]))];
+    let on_it = Scene::version(draft.clone()).unwrap().lattice;
+    assert!(on_it.exact);
+    draft.objects[0].start = [1.013, 1.5];
+    let off_it = Scene::version(draft).unwrap().lattice;
+    assert!(!off_it.exact);
+    assert_eq!(off_it.pitch_m, on_it.pitch_m);
 }

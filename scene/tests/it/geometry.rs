@@ -254,3 +254,22 @@ fn what_is_no_shape_is_refused_with_its_reason() {
     assert_eq!(far, Err(ShapeError::TooLarge { length_m: 2e5 }));
     assert_eq!(Shape::circle(f64::NAN), Err(ShapeError::NotFinite));
 }
+
+#[test]
+fn whether_a_corner_turns_is_asked_of_its_angle_and_not_of_its_size() {
+    for half in [0.05, 1.0, 1e3] {
+        let house = |rise: f64| {
+            let corners = [
+                [-1.0, -1.0],
+                [1.0, -1.0],
+                [1.0, 1.0],
+                [0.0, 1.0 + rise],
+                [-1.0, 1.0],
+            ];
+            Shape::polygon(&corners.map(|[x, y]| Vec2::new(x, y) * half))
+        };
+        // A micro-radian is the least turn; this ridge turns by twice its rise.
+        assert!(house(1e-6).is_ok(), "{half}");
+        assert!(house(0.25e-6).is_err(), "{half}");
+    }
+}

@@ -9,5 +9,6 @@ mod cspace;
 mod files;
 mod geometry;
 mod messages;
+mod near;
 mod reach;
 mod shipped;

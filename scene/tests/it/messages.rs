@@ -486,3 +486,50 @@ fn whatever_the_bytes_reading_does_not_panic() {
     let nested = format!("name = {}", "[".repeat(100_000));
     assert!(parse(&nested, "nested.toml").is_err());
 }
+
+#[test]
+fn limits_are_themselves_allowed() {
+    let most = [
+        ("speed = 0.5", "speed = 1000.0"),
+        ("speed = 0.5", "speed = 0.5\ngrasp_s = 86400.0"),
+        ("speed = 0.5", "speed = 0.5\ngrasp_s = 0.0"),
+    ];
+    for (find, replace) in most {
+        let text = SOUND.replacen(find, replace, 1);
+        assert!(parse(&text, "room.toml").is_ok(), "{}", report_of(&text));
+    }
+    let over = report("speed = 0.5", "speed = 1000.5");
+    assert!(over.contains("must be from 0 to 1000 m/s"), "{over}");
+}
+
+#[test]
+fn objects_of_a_kind_have_to_be_alike() {
+    // An order over objects of a kind would be another mistake.
+    let (room, _) = SOUND.split_once("[[before]]").unwrap();
+    let room = room.replace("start = ", "kind = \"crate\"\nstart = ");
+    let of_kind = |second: &str| format!("{room}{second}\n");
+    let alike = of_kind("");
+    assert!(parse(&alike, "room.toml").is_ok(), "{}", report_of(&alike));
+    let told = report_of(&of_kind("shape = { box = [0.4, 0.3] }"));
+    assert!(told.contains("objects[1].kind"), "{told}");
+    assert!(told.contains("is that of object 0 too"), "{told}");
+}
+
+#[test]
+fn without_a_grasp_the_robot_is_centred_below_the_object() {
+    // An object that reaches from 0.1 m left of its origin to 0.5 m right of it.
+    let corners = "[[-0.1, -0.2], [0.5, -0.2], [0.5, 0.2], [-0.1, 0.2]]";
+    let text = SOUND
+        .replacen(
+            "{ box = [0.4, 0.4] }",
+            &format!("{{ polygon = {corners} }}"),
+            1,
+        )
+        .replacen("grasp = [0.0, -0.45]", "", 1);
+    let scene = parse(&text, "room.toml").unwrap_or_else(|error| panic!("{}", error.plain()));
+    let grasp = scene.objects[0].grasp;
+    assert!(
+        (grasp - scene::Vec2::new(0.2, -0.45)).amax() < 1e-12,
+        "{grasp}"
+    );
+}
