@@ -607,4 +607,55 @@ mod tests {
         let error = World::restore(&bench.scene, slow, &bytes).err();
         assert_eq!(error, Some(CheckpointError::Foreign("length of a tick")));
     }
+
+    #[test]
+    fn every_violation_comes_back() {
+        let (robot, other, object) = (3, 4, 5);
+        for violation in [
+            Violation::Robots { robot, other },
+            Violation::Object { robot, object },
+            Violation::Wall { robot },
+            Violation::Holding { robot, object },
+            Violation::Lost { object },
+            Violation::Motion { robot },
+            Violation::Grants { robot, other },
+        ] {
+            let mut bytes = Vec::new();
+            violation.save(&mut bytes);
+            let restored = Violation::restore(&mut Reader(&bytes));
+            assert_eq!(restored.ok(), Some(violation));
+        }
+    }
+
+    #[test]
+    fn the_first_id_that_nobody_has_is_refused() {
+        const NOBODY: usize = 2;
+        fn fails(world: &mut World, task: u32, blocker: u32) {
+            let mut report = *shm_types::zeroed::<Failure>();
+            (report.task, report.blocker) = (task, blocker);
+            let since_ns = 0;
+            world.robots[0].failure = Some(PendingFailure { report, since_ns });
+        }
+        type Change = fn(&mut World);
+        let changes: [(&str, Change); 5] = [
+            ("a holder", |world| world.objects[0].holder = Some(NOBODY)),
+            ("who has claimed a task", |world| {
+                world.objects[0].claimed_by = Some(NOBODY);
+            }),
+            ("whom a robot waits for", |world| {
+                world.robots[0].link.waits_for.robot = NOBODY as u32;
+            }),
+            ("a failure", |world| fails(world, NOBODY as u32, NONE)),
+            ("a failure", |world| fails(world, 0, NOBODY as u32)),
+        ];
+        for (what, change) in changes {
+            let mut bench = bench();
+            change(&mut bench.world);
+            let error = restore(&bench, &saved(&bench)).err();
+            assert_eq!(error, Some(CheckpointError::Unsound(what)));
+        }
+        let mut bench = bench();
+        fails(&mut bench.world, 1, NONE);
+        assert!(restore(&bench, &saved(&bench)).is_ok());
+    }
 }

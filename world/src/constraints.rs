@@ -167,10 +167,12 @@ mod tests {
         );
         assert_eq!(bench.header().epoch_constraints_version, 1);
         assert_eq!(bench.header().placements, 1);
+        assert_eq!(bench.world.counters().constraints_found, 1);
         bench.table = Some(table(2, 0, &[(0, 1), (2, 1)]));
         bench.step();
         let told = bench.events(EventKind::Constraint);
         assert_eq!(told.len(), 1, "the other was told before");
+        assert_eq!(bench.world.counters().constraints_found, 2);
         assert_eq!((told[0].task, told[0].other), (2, 1));
         assert_eq!(told[0].value, u64::from(ConstraintKind::H1.code()));
         assert_eq!(bench.header().epoch, 3);

@@ -585,4 +585,17 @@ mod tests {
         bench.step_unsound();
         assert_eq!(bench.at(1), at, "all motion is held");
     }
+
+    #[test]
+    fn each_look_at_two_bodies_is_counted() {
+        let mut bench = bench();
+        let tests = |bench: &Bench| bench.world.counters().checks.swept_tests;
+        let before = tests(&bench);
+        // The two robots touch: whether they overlap has to be looked at.
+        put(&mut bench, 1, 1.5, 1.0);
+        assert_eq!(found(&mut bench), None);
+        let after = tests(&bench);
+        assert!(after > before, "{before} {after}");
+        assert!(bench.world.bodies.tests() >= after);
+    }
 }

@@ -99,3 +99,21 @@ impl IndexMut<usize> for Objects {
         &mut self.all[object]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_object_that_is_touched_is_saved_with_its_group_and_no_other() {
+        for object in 0..MAX_OBJECTS {
+            let mut touched = Touched::ALL;
+            touched.take();
+            touched.touch(object);
+            for part in 0..MAX_PARTS {
+                let is_its = (part * PER_PART..(part + 1) * PER_PART).contains(&object);
+                assert_eq!(touched.has(part), is_its, "{object} {part}");
+            }
+        }
+    }
+}

@@ -176,7 +176,7 @@ mod tests {
         Schedule, StateHash, TaskStatus, Verdict, zeroed,
     };
 
-    use super::Schedules;
+    use super::{Refused, Schedules};
     use crate::testing::{BELOW, Bench, room};
 
     /// Object 0 stands where robot 0 may grasp it, object 1 at its goal, robot 1 beside it.
@@ -560,5 +560,36 @@ mod tests {
         };
         let [nothing, refused, in_force] = [hash(0, 0), hash(0, 1), hash(1, 1)];
         assert!(nothing != refused && refused != in_force && nothing != in_force);
+    }
+
+    #[test]
+    fn who_is_refused_is_told_why() {
+        let told = |why, robot| {
+            let refused = Refused {
+                version: 3,
+                tick: 9,
+                why,
+                robot,
+            };
+            refused.to_string()
+        };
+        for (why, words) in [
+            (
+                Refusal::Gap,
+                "does not go on from the 4 actions that are granted to robot 1",
+            ),
+            (
+                Refusal::Elsewhere,
+                "robot 1 has been granted 4 actions, and they lead elsewhere",
+            ),
+        ] {
+            let told = told(why, Some((1, 4)));
+            assert!(
+                told.contains("version 3") && told.contains("tick 9"),
+                "{told}"
+            );
+            assert!(told.contains(words), "{told}");
+        }
+        assert!(told(Refusal::Illegal, None).contains("no legal message"));
     }
 }
