@@ -637,7 +637,10 @@ mod tests {
             world.robots[0].failure = Some(PendingFailure { report, since_ns });
         }
         type Change = fn(&mut World);
-        let changes: [(&str, Change); 5] = [
+        let changes: [(&str, Change); 6] = [
+            ("an object in a hand", |world| {
+                world.robots[0].hand = Hand::Holding { object: NOBODY };
+            }),
             ("a holder", |world| world.objects[0].holder = Some(NOBODY)),
             ("who has claimed a task", |world| {
                 world.objects[0].claimed_by = Some(NOBODY);
