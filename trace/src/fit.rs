@@ -273,3 +273,34 @@ pub(crate) fn state(state: &State, scene: &SceneRecord) -> Fit {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_polygon_is_convex_and_goes_round_once_counter_clockwise() {
+        let polygon = |corners: &[[f64; 2]]| {
+            let points = corners.iter().map(|[x, y]| Place::new(*x, *y)).collect();
+            outline(&Outline::Polygon { points }).is_ok()
+        };
+        let house = [
+            [-1.0, -1.0],
+            [1.0, -1.0],
+            [1.0, 0.5],
+            [0.0, 1.0],
+            [-1.0, 0.5],
+        ];
+        assert!(polygon(&house) && polygon(&house[..4]) && polygon(&house[..3]));
+        let mut clockwise = house;
+        clockwise.reverse();
+        assert!(!polygon(&clockwise));
+        assert!(!polygon(&house[..2]));
+        let mut dented = house;
+        dented[3] = [0.0, 0.0];
+        assert!(!polygon(&dented));
+        // Each corner turns left, but it goes round twice.
+        let star = [0, 2, 4, 1, 3].map(|i| house[i]);
+        assert!(!polygon(&star));
+    }
+}

@@ -293,6 +293,17 @@ fn a_lost_batch_makes_it_incomplete_but_does_not_accuse_anybody() {
         assert_eq!(report.violations, [], "{lost:?}");
         assert!(!report.complete && !report.truncated);
         assert_eq!(report.missing_batches, lost.end - lost.start);
+        let spans = Reader::new(&bytes[..]).unwrap().map(Result::unwrap);
+        for span in spans {
+            if let Close::Gap(gap) = span.close {
+                // A tick has one batch.
+                assert_eq!(
+                    gap.before_tick - gap.after_tick - 1,
+                    gap.batches,
+                    "{lost:?}"
+                );
+            }
+        }
         let frames = Replay::new(Reader::new(&bytes[..]).unwrap(), 4_900_000_000, 1);
         let frame = frames.map(Result::unwrap).next().unwrap();
         assert!(

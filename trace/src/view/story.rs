@@ -340,3 +340,20 @@ fn place_at(track: &[Motion], start: Place, time_ns: u64) -> Place {
         .checked_sub(1)
         .map_or(start, |last| track[last].at(time_ns).into())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_timeline_tells_changes_and_of_several_at_one_time_the_last() {
+        let mut timeline = Timeline::default();
+        for (time_ns, value) in [(1, 'a'), (2, 'a'), (3, 'b'), (3, 'c'), (5, 'd')] {
+            note(&mut timeline, time_ns, value);
+        }
+        assert_eq!(timeline, [(1, 'a'), (3, 'c'), (5, 'd')]);
+        let at = |time_ns| entry_at(&timeline, time_ns).copied();
+        let all = [None, Some('a'), Some('a'), Some('c'), Some('c'), Some('d')];
+        assert_eq!([0, 1, 2, 3, 4, 5].map(at), all);
+    }
+}

@@ -3,6 +3,7 @@
 
 mod events;
 mod geometry;
+mod grid;
 mod motion;
 mod story;
 mod touching;
