@@ -12,7 +12,7 @@ use shm_types::capacity::MAX_PATH_POINTS;
 use crate::body::{ClassId, ROBOT_ALONE};
 use crate::geometry::{Region, Vec2, regions_overlap};
 use crate::lattice::Connectivity;
-use crate::raster::{EAST, NORTH, NORTH_EAST, NORTH_WEST, POINT, Raster};
+use crate::raster::{EAST, NORTH, POINT, Raster};
 use crate::scene::Scene;
 use crate::shape::Shape;
 
@@ -176,30 +176,23 @@ impl Occupancy {
         if self.connectivity == Connectivity::Four {
             return steps;
         }
-        // Each diagonal: itself, and the second half of both ways around its corner.
-        if e && n
-            && free(own, NORTH_EAST)
-            && free(bits[here + 1], NORTH)
-            && free(bits[here + width], EAST)
-        {
+        // Each diagonal: both ways around its corner. What meets it but neither of these would have
+        // to lie between them, and nothing is as small: a cell is no wider than the narrowest body.
+        if e && n && free(bits[here + 1], NORTH) && free(bits[here + width], EAST) {
             steps |= 1 << 4;
         }
-        if w && n
-            && free(own, NORTH_WEST)
-            && free(west, NORTH)
-            && free(bits[here + width - 1], EAST)
-        {
+        if w && n && free(west, NORTH) && free(bits[here + width - 1], EAST) {
             steps |= 1 << 5;
         }
         if w && s {
             let corner = bits[here - width - 1];
-            if free(corner, NORTH_EAST | NORTH | EAST) {
+            if free(corner, NORTH | EAST) {
                 steps |= 1 << 6;
             }
         }
         if e && s {
             let corner = bits[here - width + 1];
-            if free(corner, NORTH_WEST | NORTH) && free(south, EAST) {
+            if free(corner, NORTH) && free(south, EAST) {
                 steps |= 1 << 7;
             }
         }

@@ -21,21 +21,11 @@ pub(crate) const POINT: u8 = 1;
 pub(crate) const EAST: u8 = 1 << 1;
 /// The step to the north (+y).
 pub(crate) const NORTH: u8 = 1 << 2;
-/// The step to the north-east.
-pub(crate) const NORTH_EAST: u8 = 1 << 3;
-/// The step to the north-west.
-pub(crate) const NORTH_WEST: u8 = 1 << 4;
 /// Every bit.
-const ALL: u8 = POINT | EAST | NORTH | NORTH_EAST | NORTH_WEST;
+const ALL: u8 = POINT | EAST | NORTH;
 
 /// What each bit stands for, as columns and rows away.
-const MOVES: [(u8, i8, i8); 5] = [
-    (POINT, 0, 0),
-    (EAST, 1, 0),
-    (NORTH, 0, 1),
-    (NORTH_EAST, 1, 1),
-    (NORTH_WEST, -1, 1),
-];
+const MOVES: [(u8, i8, i8); 3] = [(POINT, 0, 0), (EAST, 1, 0), (NORTH, 0, 1)];
 
 /// Sides of a Minkowski difference: both polygons, both sweeps, the step.
 const MAX_SIDES: usize = 2 * MAX_POLYGON_POINTS + 10;
@@ -87,11 +77,10 @@ impl Raster {
     fn fence(&mut self, lattice: &Lattice) {
         let (width, height) = (lattice.width as usize, lattice.height as usize);
         for row in self.bits.chunks_exact_mut(width) {
-            row[0] |= NORTH_WEST;
-            row[width - 1] |= EAST | NORTH_EAST;
+            row[width - 1] |= EAST;
         }
         for byte in &mut self.bits[width * (height - 1)..] {
-            *byte |= NORTH | NORTH_EAST | NORTH_WEST;
+            *byte |= NORTH;
         }
     }
 
@@ -127,24 +116,10 @@ impl Raster {
             }
             let row = i64::from(row);
             self.set(lattice, columns.start - 1, row, EAST);
-            if grid.north_east(columns.start - 1, row) {
-                self.set(lattice, columns.start - 1, row, NORTH_EAST);
-            }
-            if grid.north_west(columns.end, row) {
-                self.set(lattice, columns.end, row, NORTH_WEST);
-            }
         }
         let below = rows.start - 1;
-        for column in (columns.start - 1).max(0)..(columns.end + 1).min(i64::from(lattice.width)) {
-            if columns.contains(&column) {
-                self.set(lattice, column, below, NORTH);
-            }
-            if column < columns.end && grid.north_east(column, below) {
-                self.set(lattice, column, below, NORTH_EAST);
-            }
-            if column >= columns.start && grid.north_west(column, below) {
-                self.set(lattice, column, below, NORTH_WEST);
-            }
+        for column in clamp(&columns, lattice.width) {
+            self.set(lattice, i64::from(column), below, NORTH);
         }
     }
 
@@ -224,10 +199,6 @@ struct BoxOnGrid {
     /// Columns and rows strictly inside, which may lie off the lattice.
     columns: std::ops::Range<i64>,
     rows: std::ops::Range<i64>,
-    /// Its middle in pitches from the lattice's origin.
-    middle: Vec2,
-    /// How far from the middle's diagonal a diagonal step still meets it, in pitches.
-    reach: f64,
 }
 
 impl BoxOnGrid {
@@ -247,23 +218,7 @@ impl BoxOnGrid {
         Some(Self {
             columns: inside(low.x, high.x),
             rows: inside(low.y, high.y),
-            middle: middle / pitch,
-            reach: (half.x + half.y - CONTACT_M * std::f64::consts::SQRT_2) / pitch,
         })
-    }
-
-    /// Whether the step north-east passes it on neither side, for points next to it.
-    #[inline]
-    fn north_east(&self, column: i64, row: i64) -> bool {
-        let (x, y) = (column as f64 - self.middle.x, row as f64 - self.middle.y);
-        (x - y).abs() < self.reach
-    }
-
-    /// Whether the step north-west passes it on neither side, for points next to it.
-    #[inline]
-    fn north_west(&self, column: i64, row: i64) -> bool {
-        let (x, y) = (column as f64 - self.middle.x, row as f64 - self.middle.y);
-        (x + y).abs() < self.reach
     }
 }
 
