@@ -217,4 +217,12 @@ mod tests {
             Err(CompareError::Benchmarks { .. })
         ));
     }
+
+    #[test]
+    fn a_measure_that_was_zero_is_the_same_or_worse_beyond_all_numbers() {
+        let ratio = |before, after| from_zero(before, after).map(|estimate| estimate.value);
+        assert_eq!(ratio(0.0, 0.0), Some(1.0));
+        assert_eq!(ratio(0.0, 2.0), Some(f64::MAX));
+        assert_eq!(ratio(1.0, 2.0), None);
+    }
 }

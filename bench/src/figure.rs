@@ -544,8 +544,87 @@ mod tests {
             .into();
         assert_eq!(labels, ["0 %", "90 %", "99 %", "99.9 %"]);
         assert_eq!(
-            [0.0, 0.05, 1.5, 12_000.0, 3e6].map(short),
-            ["0", "0.05", "1.5", "12 k", "3 M"]
+            [0.0, 0.005_12, 0.05, 1.5, 123.456, 12_000.0, 3e6, 4e9].map(short),
+            ["0", "0.0051", "0.05", "1.5", "123.46", "12 k", "3 M", "4 G"]
+        );
+    }
+
+    /// A number that an element of the drawing has.
+    fn number(element: &str, name: &str) -> f64 {
+        let (_, rest) = element.split_once(&format!(" {name}=\"")).unwrap();
+        rest.split('"').next().unwrap().parse().unwrap()
+    }
+
+    fn elements<'a>(figure: &'a Figure, word: &str) -> impl Iterator<Item = &'a str> {
+        figure
+            .svg
+            .split('<')
+            .filter(move |element| element.starts_with(word))
+    }
+
+    #[test]
+    fn marks_lie_where_their_numbers_are() {
+        let series = [Series {
+            name: "a".into(),
+            points: vec![(2.0, 1.0), (4.0, 10.0), (6.0, 100.0)],
+            intervals: vec![],
+        }];
+        let figure = lines("t", "c", axes(Scale::Linear, Scale::Log), &series).unwrap();
+        let places = |name| elements(&figure, "circle").map(move |mark| number(mark, name));
+        let (across, up): (Vec<_>, Vec<_>) = (places("cx").collect(), places("cy").collect());
+        // Equal steps to the right, and, by factors of ten, up; a pixel is the least.
+        assert!(across[1] > across[0] + 50.0 && up[1] < up[0] - 50.0);
+        assert!(
+            (across[0] + across[2] - 2.0 * across[1]).abs() <= 2.0,
+            "{across:?}"
+        );
+        assert!((up[0] + up[2] - 2.0 * up[1]).abs() <= 2.0, "{up:?}");
+    }
+
+    #[test]
+    fn an_axis_holds_all_its_places() {
+        for scale in [Scale::Linear, Scale::Log, Scale::Quantile] {
+            for places in [vec![3.0], vec![1.0, 4.0, 2.0]] {
+                let (low, high) = range(scale, places.iter().copied()).unwrap();
+                assert!(places.iter().all(|place| low <= *place && *place < high));
+            }
+            assert_eq!(range(scale, std::iter::empty()), None);
+        }
+    }
+
+    #[test]
+    fn parts_of_a_bar_stand_on_one_another_above_their_labels() {
+        let bars_of = |label: &str| Bar {
+            label: label.into(),
+            parts: vec![1.0, 2.0],
+        };
+        let groups = [Group {
+            label: "room".into(),
+            bars: vec![bars_of("x")],
+        }];
+        let figure = bars("t", "c", "s", &["moving", "waiting"], &groups).unwrap();
+        let part = |index| {
+            let fill = colour(index);
+            let part = elements(&figure, "rect")
+                .find(|part| part.contains(&fill))
+                .unwrap();
+            (number(part, "y"), number(part, "height"))
+        };
+        let ((low_y, low), (high_y, high)) = (part(0), part(1));
+        assert!(
+            (high_y + high - low_y).abs() <= 2.0,
+            "{high_y} {high} {low_y}"
+        );
+        assert!((high - 2.0 * low).abs() <= 3.0, "{high} {low}");
+        let y = |words: &str| {
+            let text = elements(&figure, "text").find(|text| text.trim_end().ends_with(words));
+            number(text.unwrap(), "y")
+        };
+        assert!(
+            low_y + low < y("x") && y("x") < y("room"),
+            "{} {}",
+            y("x"),
+            y("room")
         );
     }
 }

@@ -522,4 +522,30 @@ mod tests {
         let (findings, _) = judge(&table(|_, _| 1.0, PAPERS));
         assert_eq!(held(&findings, "planning is least"), None);
     }
+
+    #[test]
+    fn planning_is_averaged_over_the_rooms_that_every_method_solves() {
+        let run = |solved, planning_s| Run {
+            solved,
+            execution_s: 1.0,
+            planning_s,
+            total_s: 1.0,
+            robots: 2.0,
+        };
+        let of = |rooms: &[(&str, bool, f64)]| -> BTreeMap<Situation, Run> {
+            let runs = rooms.iter().map(|(room, solved, planning_s)| {
+                (vec![(*room).to_owned()], run(*solved, *planning_s))
+            });
+            runs.collect()
+        };
+        let mut runs = Runs::new();
+        runs.insert(
+            "x".into(),
+            of(&[("a", true, 1.0), ("b", true, 10.0), ("c", true, 20.0)]),
+        );
+        runs.insert("y".into(), of(&[("a", true, 3.0), ("b", false, 30.0)]));
+        // Room b was not solved by one of them, room c was not given to it.
+        let planning = planning_by_robots(&runs, &["x", "y"]);
+        assert_eq!(planning, [(2.0, vec![2.0, 6.0])]);
+    }
 }

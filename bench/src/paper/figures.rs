@@ -224,3 +224,18 @@ fn initials(method: &str) -> &str {
         other => other,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_come_once_each_in_the_order_of_the_rows() {
+        let mut table = Table::new("runs", "Runs").key("room", "", "");
+        for room in ["b", "a", "b", "c", "a"] {
+            table.push(vec![room.into()]);
+        }
+        assert_eq!(values(&table, "room"), ["b", "a", "c"]);
+        assert!(values(&table, "no such column").is_empty());
+    }
+}
