@@ -286,6 +286,24 @@ fn a_leg_is_one_record_and_bodies_are_where_they_were() {
 }
 
 #[test]
+fn a_still_is_as_high_as_what_is_in_it() {
+    let story = trace::Story::read(Reader::new(&short_run()[..]).unwrap()).unwrap();
+    let still = trace::still(&story, story.until_s());
+    let after = |text: &str, what: &str| -> f64 {
+        let (_, rest) = text.split_once(what).unwrap();
+        rest.split('"').next().unwrap().parse().unwrap()
+    };
+    let height = after(&still, " height=\"");
+    let texts = still.split("<text").skip(1);
+    let lowest = texts.map(|text| after(text, " y=\"")).fold(0.0, f64::max);
+    // Below the last line of the legend there is about another one.
+    assert!(
+        (lowest..lowest + 60.0).contains(&height),
+        "{lowest} of {height}"
+    );
+}
+
+#[test]
 fn a_lost_batch_makes_it_incomplete_but_does_not_accuse_anybody() {
     for lost in [0..1, 100..101, 150..260, 490..501] {
         let bytes = written(|sequence, _| !lost.contains(&sequence));

@@ -399,3 +399,52 @@ fn ns(time_s: f64) -> u64 {
 fn round(px: f64) -> f64 {
     (px * 100.0).round() / 100.0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_room_fills_the_canvas_and_its_north_is_up() {
+        for (wide, high) in [(6.0, 4.0), (2.0, 9.0), (0.5, 0.5)] {
+            let (low, up) = (Place::new(-1.0, 2.0), Place::new(wide - 1.0, high + 2.0));
+            let canvas = Canvas::new(low, up);
+            let (width, height) = canvas.size();
+            assert!((width / height - wide / high).abs() < 1e-9);
+            assert!((width - WIDTH).abs() < 1e-9 || (height - HEIGHT).abs() < 1e-9);
+            assert!(width <= WIDTH + 1e-9 && height <= HEIGHT + 1e-9);
+            let below = (MARGIN, round(MARGIN + height));
+            assert_eq!(canvas.point(low), below);
+            assert_eq!(canvas.point(up), (round(MARGIN + width), MARGIN));
+        }
+    }
+
+    #[test]
+    fn a_line_keeps_its_bends_and_where_it_turns_back() {
+        let line = [
+            (0.0, 0.0),
+            (1.0, 0.0),
+            (2.0, 0.0),
+            (2.0, 1.0),
+            (2.0, 2.0),
+            (2.0, 1.0),
+            (3.0, 2.0),
+        ];
+        let kept = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (2.0, 1.0), (3.0, 2.0)];
+        assert_eq!(straightened(line.to_vec()), kept);
+        assert_eq!(list(&[(1.0, 2.5), (3.0, 4.0)]), "1,2.5 3,4");
+    }
+
+    #[test]
+    fn the_legend_breaks_lines_between_items_that_do_not_fit_beside_each_other() {
+        let lines = |lengths: &[usize]| {
+            let items = lengths.iter().map(|length| (None, "x".repeat(*length)));
+            lay_out(items.collect(), 0.0, 300.0).1
+        };
+        assert_eq!(lines(&[5, 5]), 1);
+        assert_eq!(lines(&[20, 20]), 2);
+        // What fits nowhere has a line of its own, and no empty one before it.
+        assert_eq!(lines(&[200]), 1);
+        assert_eq!(lines(&[5, 200, 5]), 3);
+    }
+}
