@@ -286,7 +286,7 @@ fn a_leg_is_one_record_and_bodies_are_where_they_were() {
 }
 
 #[test]
-fn a_still_is_as_high_as_what_is_in_it() {
+fn a_still_is_as_large_as_what_is_in_it() {
     let story = trace::Story::read(Reader::new(&short_run()[..]).unwrap()).unwrap();
     let still = trace::still(&story, story.until_s());
     let after = |text: &str, what: &str| -> f64 {
@@ -296,11 +296,19 @@ fn a_still_is_as_high_as_what_is_in_it() {
     let height = after(&still, " height=\"");
     let texts = still.split("<text").skip(1);
     let lowest = texts.map(|text| after(text, " y=\"")).fold(0.0, f64::max);
-    // Below the last line of the legend there is about another one.
+    // Room for another line, and as much on the right as on the left of the room.
     assert!(
         (lowest..lowest + 60.0).contains(&height),
         "{lowest} of {height}"
     );
+    let floor = still
+        .split('<')
+        .find(|element| element.contains("\"floor\""));
+    let (left, wide) = (
+        after(floor.unwrap(), " x=\""),
+        after(floor.unwrap(), " width=\""),
+    );
+    assert!((after(&still, " width=\"") - wide - 2.0 * left).abs() < 0.1);
 }
 
 #[test]
