@@ -55,8 +55,10 @@ const ROUND_S: f64 = 0.25;
 const REACTION_S: f64 = 0.25;
 /// World time after which no first plan is looked for any more, s.
 const MOST_S: u64 = 60;
-/// Sequences looked for before the complete search begins.
-const ATTEMPTS_BEFORE_SEARCH: u64 = 3;
+/// Attempts at a first plan before a proof is looked for that there is none.
+const ATTEMPTS_BEFORE_PROOF: u64 = 3;
+/// The same before the complete search begins.
+const ATTEMPTS_BEFORE_SEARCH: u64 = 8;
 /// Ticks for which nothing may change before it counts as standing still.
 const TICKS_TO_SETTLE: u64 = 20;
 /// World time for which nothing may change while a plan for all objects is not carried out before
@@ -384,29 +386,18 @@ impl Anytime {
             let most = units(MOST_BEFORE_MOTION_S).saturating_sub(solver.order_units);
             Stage::Better(until.min(most))
         };
-        let most = units_per_second.saturating_mul(MOST_S);
         let mut is_written = false;
         self.stage = match self.stage {
             Stage::First(attempt) => match solver.first(scene, attempt) {
                 Some(makespan) => better(solver, makespan),
-                None if attempt + 1 < ATTEMPTS_BEFORE_SEARCH => Stage::First(attempt + 1),
-                None if solver.is_short => self.most(solver, scene),
-                None if attempt + 1 == ATTEMPTS_BEFORE_SEARCH => {
-                    if solver.is_start {
-                        Stage::Prove
-                    } else {
-                        Stage::Search
-                    }
-                }
-                None if solver.units() < most => Stage::First(attempt + 1),
-                None => self.most(solver, scene),
+                None => self.go_on_after(attempt + 1, solver, scene),
             },
             Stage::Prove => {
                 let (proof, work) = Proof::search(scene);
                 self.proving = work;
                 match proof {
                     Some(_) => Stage::Done(Verdict::Proved),
-                    None => Stage::Search,
+                    None => Stage::First(ATTEMPTS_BEFORE_PROOF),
                 }
             }
             Stage::Search => match solver.search(scene) {
@@ -460,6 +451,18 @@ impl Anytime {
             }
         };
         is_written
+    }
+
+    /// What comes after so many attempts at a first plan that found none.
+    fn go_on_after(&mut self, attempts: u64, solver: &mut Solver, scene: &Scene) -> Stage {
+        let most = self.settings.units_per_second.saturating_mul(MOST_S);
+        match attempts {
+            ATTEMPTS_BEFORE_PROOF if solver.is_short => self.most(solver, scene),
+            ATTEMPTS_BEFORE_PROOF if solver.is_start => Stage::Prove,
+            ATTEMPTS_BEFORE_SEARCH => Stage::Search,
+            _ if solver.units() < most => Stage::First(attempts),
+            _ => self.most(solver, scene),
+        }
     }
 
     /// There is no plan for all objects: as many as possible are brought to their goals.

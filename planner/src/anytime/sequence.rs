@@ -11,29 +11,27 @@
 //!
 //! Terms: an *arrangement* says where each object stands.
 
+mod depth_first;
 mod floods;
+mod monotone;
+mod perturb;
+mod places;
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashSet, VecDeque};
 use std::rc::Rc;
 
-use rand::seq::SliceRandom;
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use scene::{Event, ROBOT_ALONE, Scene, UserOrder};
+use scene::{CONTACT_M, Event, ROBOT_ALONE, Scene, UserOrder};
 
 use crate::anytime::ground::Ground;
+use crate::anytime::sequence::perturb::{FIRST_NODES, Trees};
 use crate::anytime::track::Place;
 use crate::frontier::NOWHERE;
 
 /// Floods of the first attempts; later ones may take more.
 const FLOODS_PER_ATTEMPT: u64 = 2_000;
-/// Stuck objects for which others are set aside, in one arrangement.
-const STUCK_LOOKED_AT: usize = 4;
-/// Intermediate places tried for one object in one arrangement.
-const PLACES_TRIED: usize = 3;
-/// Places looked at until that many are found.
-const PLACES_LOOKED_AT: usize = 400;
 /// The same for each object, where that is more: three are needed to move one.
 const FLOODS_PER_OBJECT: u64 = 12;
 /// What a step through an object costs, in steps.
@@ -41,6 +39,18 @@ const PRICE: u32 = 40;
 
 /// A move of a sequence: an object, and where it goes.
 pub(crate) type Step = (usize, Rc<Place>);
+
+/// The ways of a move.
+#[derive(Clone, Debug, Default)]
+struct Ways {
+    /// Class of the robot with the object.
+    class: usize,
+    /// Cells of the robot with the object, and of the robot on its approach and way back.
+    carrying: Vec<u32>,
+    alone: Vec<u32>,
+    /// Whether these are all.
+    is_whole: bool,
+}
 
 /// Looks for sequences.
 pub(crate) struct Sequencer {
@@ -60,24 +70,20 @@ pub(crate) struct Sequencer {
     ahead: [BinaryHeap<(Reverse<i32>, u32)>; 2],
     visited: HashSet<Vec<u32>>,
     random: ChaCha8Rng,
-    /// Whether objects are tried in the order of dice.
-    is_shuffled: bool,
+    /// The way found last: where its two ends met.
+    met: (u32, u32),
+    /// The ways of the move that was found possible last.
+    ways: Ways,
+    /// Arrangements reached by perturbing, to be gone on from.
+    trees: Option<Trees>,
+    /// How many the next trees may have.
+    most_nodes: usize,
     most_floods: u64,
     /// How many objects are not at their goals after these steps; the fewest so far.
     most: Option<(usize, Vec<Step>)>,
     pub(crate) floods: u64,
     /// Lattice points looked at.
     pub(crate) cells: u64,
-}
-
-/// What the way of a stuck object would be without those it crosses.
-struct Crossing {
-    /// Class of the robot with the object.
-    class: usize,
-    crossed: Vec<usize>,
-    /// Cells of the robot on its approach and way back, and of the robot with the object.
-    alone: Vec<u32>,
-    carrying: Vec<u32>,
 }
 
 impl Sequencer {
@@ -101,7 +107,10 @@ impl Sequencer {
             ahead: Default::default(),
             visited: HashSet::new(),
             random: ChaCha8Rng::seed_from_u64(7),
-            is_shuffled: false,
+            met: (0, 0),
+            ways: Ways::default(),
+            trees: None,
+            most_nodes: FIRST_NODES,
             most_floods: 0,
             most: None,
             floods: 0,
@@ -112,6 +121,7 @@ impl Sequencer {
     /// Other goals.
     pub(crate) fn aim(&mut self, goals: Vec<Option<Rc<Place>>>) {
         self.goals = goals;
+        self.trees = None;
     }
 
     /// A sequence that leads from these places to the goals. Another attempt rolls other dice, and
@@ -124,9 +134,11 @@ impl Sequencer {
         attempt: u64,
     ) -> Option<Vec<Step>> {
         self.start = start.to_vec();
-        self.is_shuffled = attempt > 0;
         let least = FLOODS_PER_ATTEMPT.max(FLOODS_PER_OBJECT * start.len() as u64);
-        self.most_floods = self.floods + least * (1 + attempt / 8);
+        self.most_floods = self.floods + least;
+        if attempt > 0 {
+            return self.perturb(scene, ground);
+        }
         for asides in [0, 1, 2, 4, start.len() + 4] {
             self.visited.clear();
             let mut places = start.to_vec();
@@ -138,124 +150,19 @@ impl Sequencer {
         None
     }
 
+    /// Takes note of steps that leave so many objects elsewhere than at their goals.
+    fn note(&mut self, missing: usize, steps: impl FnOnce() -> Vec<Step>) {
+        if (self.most.as_ref()).is_none_or(|(fewest, _)| missing < *fewest) {
+            self.most = Some((missing, steps()));
+        }
+    }
+
     /// The sequence with which most objects got to their goals, of all that were looked at.
     pub(crate) fn most(&self) -> Vec<Step> {
         self.most
             .as_ref()
             .map(|(_, steps)| steps.clone())
             .unwrap_or_default()
-    }
-
-    fn search(
-        &mut self,
-        scene: &Scene,
-        ground: &Ground,
-        places: &mut [Rc<Place>],
-        steps: &mut Vec<Step>,
-        asides: usize,
-    ) -> bool {
-        let mut open: Vec<usize> = (0..places.len())
-            .filter(|&object| !self.is_at_goal(object, places))
-            .collect();
-        if self.is_shuffled {
-            open.shuffle(&mut self.random);
-        } else if let Some(&(last, _)) = steps.last() {
-            // Those before the one moved last could not move a moment ago.
-            let after = open.partition_point(|&object| object <= last);
-            open.rotate_left(after);
-        }
-        let missing = open
-            .iter()
-            .filter(|&&object| self.goals[object].is_some())
-            .count();
-        if (self.most.as_ref()).is_none_or(|(fewest, _)| missing < *fewest) {
-            self.most = Some((missing, steps.clone()));
-        }
-        if open.is_empty() {
-            return true;
-        }
-        let mut key: Vec<u32> = (places.iter())
-            .flat_map(|place| place.grasps.iter().copied())
-            .collect();
-        key.push(asides as u32);
-        if self.floods > self.most_floods || !self.visited.insert(key) {
-            return false;
-        }
-        for &object in &open {
-            let Some(goal) = self.goals[object].clone() else {
-                continue;
-            };
-            if self.is_early(places, object, Event::Finish) {
-                continue;
-            }
-            for by in 0..ground.grasps(object) {
-                let goal = goal.held(by);
-                if self.can_move(ground, places, object, &goal)
-                    && self.try_step(scene, ground, places, steps, (object, goal), asides)
-                {
-                    return true;
-                }
-            }
-        }
-        let Some(fewer) = asides.checked_sub(1) else {
-            return false;
-        };
-        for &object in open.iter().take(STUCK_LOOKED_AT) {
-            for place in self.regrasps(scene, ground, places, object) {
-                if self.try_step(scene, ground, places, steps, (object, place), fewer) {
-                    return true;
-                }
-            }
-        }
-        let stuck = open.iter().take(STUCK_LOOKED_AT);
-        for (object, by) in
-            stuck.flat_map(|&object| (0..ground.grasps(object)).map(move |by| (object, by)))
-        {
-            let Some(crossing) = self.crossing(ground, places, object, by) else {
-                continue;
-            };
-            // What is to be set aside may itself be shut in.
-            let mut crossed = crossing.crossed.clone();
-            for &aside in &crossing.crossed {
-                let homes = self.homes.clone();
-                let Some(grasp) = places[aside].open_grasps().next() else {
-                    continue;
-                };
-                let alone = ROBOT_ALONE.0;
-                self.cheapest(ground, places, aside, alone, &homes, grasp, &mut crossed);
-            }
-            crossed.dedup();
-            if self.is_shuffled {
-                crossed.shuffle(&mut self.random);
-            }
-            for &aside in &crossed {
-                for place in self.all_asides(scene, ground, places, aside, &crossing) {
-                    if self.try_step(scene, ground, places, steps, (aside, place), fewer) {
-                        return true;
-                    }
-                }
-            }
-        }
-        false
-    }
-
-    fn try_step(
-        &mut self,
-        scene: &Scene,
-        ground: &Ground,
-        places: &mut [Rc<Place>],
-        steps: &mut Vec<Step>,
-        (object, to): Step,
-        asides: usize,
-    ) -> bool {
-        let before = std::mem::replace(&mut places[object], Rc::clone(&to));
-        steps.push((object, to));
-        let done = self.search(scene, ground, places, steps, asides);
-        if !done {
-            places[object] = before;
-            steps.pop();
-        }
-        done
     }
 
     /// Whether the user's order wants something else done before an object is grasped, or
@@ -266,7 +173,7 @@ impl Sequencer {
             let (first, done) = order.first;
             let concerns = then == object && (of == event || of != Event::Finish);
             let has_moved = self.is_at_goal(first, places)
-                || (self.start[first].at - places[first].at).norm() > scene::CONTACT_M;
+                || (self.start[first].at - places[first].at).norm() > CONTACT_M;
             let is_done = match done {
                 Event::Start | Event::Grasp => has_moved,
                 Event::Finish => self.is_at_goal(first, places),
@@ -278,7 +185,7 @@ impl Sequencer {
     fn is_at_goal(&self, object: usize, places: &[Rc<Place>]) -> bool {
         self.goals[object]
             .as_ref()
-            .is_none_or(|goal| (goal.at - places[object].at).norm() <= scene::CONTACT_M)
+            .is_none_or(|goal| (goal.at - places[object].at).norm() <= CONTACT_M)
     }
 
     /// Whether an object can be fetched, brought there and left, with the others as they are.
@@ -290,6 +197,18 @@ impl Sequencer {
         to: &Place,
     ) -> bool {
         let from = places[object].held(to.by);
+        self.can_move_from(ground, places, object, &from, to)
+    }
+
+    /// The same from another place.
+    fn can_move_from(
+        &mut self,
+        ground: &Ground,
+        places: &[Rc<Place>],
+        object: usize,
+        from: &Place,
+        to: &Place,
+    ) -> bool {
         if from.grasp == NOWHERE || to.grasp == NOWHERE {
             return false;
         }
@@ -298,26 +217,43 @@ impl Sequencer {
         if !self.finds(ground, carrying, from.grasp, to.grasp) {
             return false;
         }
+        let mut ways = std::mem::take(&mut self.ways);
+        ways.class = carrying;
+        ways.carrying.clear();
+        ways.alone.clear();
+        self.found(&mut ways.carrying);
         // Somebody has to come from a home and get back to it: the nearest one is tried first.
         let far = |home: &&u32| {
             let (dx, dy) = ground.offset(**home, from.grasp);
             dx.abs() + dy.abs()
         };
-        let Some(nearest) = self.homes.iter().min_by_key(far).copied() else {
-            return false;
-        };
-        let mut is_near = true;
-        for place in [&*from, to] {
-            self.block(ground, places, object, ROBOT_ALONE.0);
-            self.block_cells(&place.bare);
-            is_near = is_near && self.finds(ground, ROBOT_ALONE.0, place.grasp, nearest);
-        }
-        if is_near {
-            return true;
-        }
+        let nearest = self.homes.iter().min_by_key(far).copied();
+        ways.is_whole = nearest.is_some_and(|nearest| {
+            [from, to].into_iter().all(|place| {
+                self.block(ground, places, object, ROBOT_ALONE.0);
+                self.block_cells(&place.bare);
+                let finds = self.finds(ground, ROBOT_ALONE.0, place.grasp, nearest);
+                if finds {
+                    self.found(&mut ways.alone);
+                }
+                finds
+            })
+        });
+        self.ways = ways;
+        self.ways.is_whole || self.can_return(ground, places, object, [from, to])
+    }
+
+    /// Whether some home can be reached from both ends of a move.
+    fn can_return(
+        &mut self,
+        ground: &Ground,
+        places: &[Rc<Place>],
+        object: usize,
+        ends: [&Place; 2],
+    ) -> bool {
         let homes = std::mem::take(&mut self.homes);
         let mut open: Vec<u32> = homes.clone();
-        for place in [&*from, to] {
+        for place in ends {
             self.block(ground, places, object, ROBOT_ALONE.0);
             self.block_cells(&place.bare);
             self.reaches(ground, ROBOT_ALONE.0, &[place.grasp], &[]);
@@ -329,210 +265,9 @@ impl Sequencer {
         self.homes = homes;
         !open.is_empty()
     }
+}
 
-    /// The cheapest way of a stuck object through others, held by one of its grasps.
-    fn crossing(
-        &mut self,
-        ground: &Ground,
-        places: &[Rc<Place>],
-        object: usize,
-        by: u8,
-    ) -> Option<Crossing> {
-        let goal = self.goals[object].as_ref()?.held(by);
-        let from = places[object].held(by);
-        if from.grasp == NOWHERE || goal.grasp == NOWHERE {
-            return None;
-        }
-        let class = ground.carrying(object, by);
-        let homes = self.homes.clone();
-        let mut crossed = Vec::new();
-        let carrying = self.cheapest(
-            ground,
-            places,
-            object,
-            class,
-            &[from.grasp],
-            goal.grasp,
-            &mut crossed,
-        )?;
-        let alone = ROBOT_ALONE.0;
-        let mut ways = self.cheapest(
-            ground,
-            places,
-            object,
-            alone,
-            &homes,
-            from.grasp,
-            &mut crossed,
-        )?;
-        ways.extend(self.cheapest(
-            ground,
-            places,
-            object,
-            alone,
-            &homes,
-            goal.grasp,
-            &mut crossed,
-        )?);
-        crossed.sort_unstable();
-        crossed.dedup();
-        Some(Crossing {
-            class,
-            crossed,
-            alone: ways,
-            carrying,
-        })
-    }
-
-    /// Places to which an object can be set aside by any of its grasps.
-    fn all_asides(
-        &mut self,
-        scene: &Scene,
-        ground: &Ground,
-        places: &[Rc<Place>],
-        aside: usize,
-        crossing: &Crossing,
-    ) -> Vec<Rc<Place>> {
-        (0..ground.grasps(aside))
-            .flat_map(|by| self.asides(scene, ground, places, (aside, by), crossing, None))
-            .collect()
-    }
-
-    /// Places at which an object can be put down, to be grasped otherwise and brought to its goal.
-    fn regrasps(
-        &mut self,
-        scene: &Scene,
-        ground: &Ground,
-        places: &[Rc<Place>],
-        object: usize,
-    ) -> Vec<Rc<Place>> {
-        let Some(goal) = self.goals[object].clone() else {
-            return Vec::new();
-        };
-        if ground.grasps(object) == 1 || self.is_early(places, object, Event::Finish) {
-            return Vec::new();
-        }
-        let nothing = Crossing {
-            class: ROBOT_ALONE.0,
-            crossed: Vec::new(),
-            alone: Vec::new(),
-            carrying: Vec::new(),
-        };
-        (0..ground.grasps(object))
-            .flat_map(|by| self.asides(scene, ground, places, (object, by), &nothing, Some(&goal)))
-            .collect()
-    }
-
-    /// Whether an object can be brought on from a place by another grasp than that which brought
-    /// it there.
-    fn leads_on(
-        &mut self,
-        ground: &Ground,
-        places: &[Rc<Place>],
-        object: usize,
-        place: &Rc<Place>,
-        goal: &Rc<Place>,
-    ) -> bool {
-        let mut then = places.to_vec();
-        then[object] = Rc::clone(place);
-        (0..ground.grasps(object))
-            .filter(|&by| by != place.by)
-            .any(|by| self.can_move(ground, &then, object, &goal.held(by)))
-    }
-
-    /// Places to which an object, held by one of its grasps, can be set aside, so that it hinders
-    /// neither a way nor a goal.
-    fn asides(
-        &mut self,
-        scene: &Scene,
-        ground: &Ground,
-        places: &[Rc<Place>],
-        (aside, by): (usize, u8),
-        crossing: &Crossing,
-        onward: Option<&Rc<Place>>,
-    ) -> Vec<Rc<Place>> {
-        let class = ground.carrying(aside, by);
-        let from = places[aside].held(by);
-        if from.grasp == NOWHERE || self.is_early(places, aside, Event::Grasp) {
-            return Vec::new();
-        }
-        // Everything it can be brought to, nearest first.
-        self.block(ground, places, aside, class);
-        self.reaches(ground, class, &[from.grasp], &[]);
-        let reached_now = self.mark(0);
-        let mut reached: Vec<u32> = Vec::new();
-        let mut near = VecDeque::from([from.grasp]);
-        let mut listed = vec![false; ground.points()];
-        listed[from.grasp as usize] = true;
-        while let Some(cell) = near.pop_front() {
-            reached.push(cell);
-            for direction in 0..4 {
-                let next = cell.wrapping_add_signed(ground.offsets[direction]);
-                let within = (next as usize) < listed.len();
-                if within && self.seen[next as usize] == reached_now && !listed[next as usize] {
-                    listed[next as usize] = true;
-                    near.push_back(next);
-                }
-            }
-        }
-        let stride = (reached.len() / PLACES_LOOKED_AT).max(1);
-        let mut found = Vec::new();
-        for with_goals in [true, false] {
-            let skipped = if self.is_shuffled {
-                self.random.random_range(0..reached.len())
-            } else {
-                0
-            };
-            let from_there = reached.iter().skip(skipped);
-            for &cell in from_there.chain(&reached[..skipped]).step_by(stride) {
-                if found.len() >= PLACES_TRIED || self.floods > self.most_floods {
-                    return found;
-                }
-                let grasp = scene.objects[aside].grasps[usize::from(by)].offset;
-                let at = scene.lattice.at(cell) - grasp;
-                let place = Place::of(scene, ground, aside, at).held(by);
-                if place.grasp != NOWHERE
-                    && self.is_clear(ground, places, aside, &place, crossing, with_goals)
-                    && self.can_move(ground, places, aside, &place)
-                    && onward.is_none_or(|goal| self.leads_on(ground, places, aside, &place, goal))
-                {
-                    found.push(place);
-                }
-            }
-            if !found.is_empty() {
-                break;
-            }
-        }
-        found
-    }
-
-    /// Whether an object at a place hinders neither the way of the stuck one nor, if asked, goals.
-    fn is_clear(
-        &self,
-        ground: &Ground,
-        places: &[Rc<Place>],
-        aside: usize,
-        place: &Place,
-        crossing: &Crossing,
-        with_goals: bool,
-    ) -> bool {
-        let free = |class: usize, cells: &[u32]| {
-            cells
-                .iter()
-                .all(|cell| place.cells[class].binary_search(cell).is_err())
-        };
-        let ways = free(crossing.class, &crossing.carrying)
-            && free(ROBOT_ALONE.0, &crossing.alone)
-            && free(ROBOT_ALONE.0, &self.homes);
-        let goals = !with_goals
-            || (0..places.len()).all(|other| {
-                let reached = |goal: &Rc<Place>| {
-                    let grasps = goal.grasps.iter().zip(0..);
-                    let mut grasps = grasps.map(|(&cell, by)| (ground.carrying(other, by), cell));
-                    grasps.any(|(class, cell)| free(class, &[cell]))
-                };
-                other == aside || self.goals[other].as_ref().is_none_or(reached)
-            });
-        ways && goals
-    }
+/// Whether an object is at the same place in both.
+fn is_same(a: &Place, b: &Place) -> bool {
+    (a.at - b.at).norm() <= CONTACT_M
 }

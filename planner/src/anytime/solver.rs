@@ -227,16 +227,17 @@ impl Solver {
         self.begin_with(scene, &sequence)
     }
 
-    /// Goals of interchangeable objects: as the scene has them in every other attempt, else as the
-    /// dice fall.
+    /// Goals of interchangeable objects: as the scene has them, then as the dice fall, in turn;
+    /// each time for twice as many attempts, since these go on from one another.
     fn assign_goals(&mut self, scene: &Scene, attempt: u64) {
         let mut goals = self.goals.clone();
         let kinds = scene.objects.iter().filter_map(|object| object.kind);
         let count = kinds.max().map_or(0, |last| last + 1);
-        if count == 0 {
+        if count == 0 || attempt > 0 && !attempt.is_power_of_two() {
             return;
         }
-        for kind in (0..count).filter(|_| attempt % 2 == 1) {
+        let is_dealt = attempt > 0 && attempt.ilog2() % 2 == 0;
+        for kind in (0..count).filter(|_| is_dealt) {
             let of_kind = |object: &usize| scene.objects[*object].kind == Some(kind);
             let members: Vec<usize> = (0..goals.len()).filter(of_kind).collect();
             let mut dealt: Vec<_> = members

@@ -50,7 +50,9 @@ impl Sequencer {
             self.ahead[side].clear();
             self.ahead[side].push((Reverse(0), end));
             self.seen[end as usize] = self.mark(side);
+            self.from[end as usize] = u32::MAX;
         }
+        self.met = (from, to);
         if from == to {
             return true;
         }
@@ -64,16 +66,28 @@ impl Sequencer {
                 let next = cell.wrapping_add_signed(ground.offsets[direction]);
                 let seen = self.seen[next as usize];
                 if seen == self.mark(1 - side) {
+                    self.met = (cell, next);
                     return true;
                 }
                 if seen != self.mark(side) && !is_blocked(self, next) {
                     self.seen[next as usize] = self.mark(side);
+                    self.from[next as usize] = cell;
                     let (dx, dy) = ground.offset(next, ends[1 - side]);
                     self.ahead[side].push((Reverse(dx.abs() + dy.abs()), next));
                 }
             }
         }
         false
+    }
+
+    /// The cells of the way that was just found.
+    pub(super) fn found(&self, cells: &mut Vec<u32>) {
+        for mut cell in [self.met.0, self.met.1] {
+            while cell != u32::MAX {
+                cells.push(cell);
+                cell = self.from[cell as usize];
+            }
+        }
     }
 
     /// What a point is marked with that was reached in this round, from either end.
