@@ -2,12 +2,13 @@
 //! somewhere in between.
 //!
 //! Responsible for: a list of moves, each of which has an approach from a home, a transfer and a way
-//! back home among all other objects as they stand then; intermediate places.
+//! back home among all other objects as they stand then.
 //! Not responsible for: robots in each other's way, time (`plan`).
 //!
-//! How: depth first over arrangements. Whatever can go to its goal goes there. If nothing can, the
-//! cheapest way of an object *through* others (rule 29) tells which of these to set aside, and
-//! they go to the nearest place from which they hinder neither that way nor a goal.
+//! How: the first attempt is made depth first (`depth_first`). It sets aside what is seen to be in
+//! the way, to the nearest place that is clear of it. That is quick, and misses what has to go far,
+//! or before it is in anybody's way. Further attempts look for that from both ends, with dice
+//! (`perturb`).
 //!
 //! Terms: an *arrangement* says where each object stands.
 
@@ -16,6 +17,9 @@ mod floods;
 mod monotone;
 mod perturb;
 mod places;
+#[cfg(test)]
+mod tests;
+mod trees;
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashSet, VecDeque};
@@ -26,11 +30,12 @@ use rand_chacha::ChaCha8Rng;
 use scene::{CONTACT_M, Event, ROBOT_ALONE, Scene, UserOrder};
 
 use crate::anytime::ground::Ground;
-use crate::anytime::sequence::perturb::{FIRST_NODES, Trees};
+use crate::anytime::sequence::perturb::FIRST_NODES;
+use crate::anytime::sequence::trees::Trees;
 use crate::anytime::track::Place;
 use crate::frontier::NOWHERE;
 
-/// Floods of the first attempts; later ones may take more.
+/// Floods of an attempt.
 const FLOODS_PER_ATTEMPT: u64 = 2_000;
 /// The same for each object, where that is more: three are needed to move one.
 const FLOODS_PER_OBJECT: u64 = 12;
@@ -124,8 +129,8 @@ impl Sequencer {
         self.trees = None;
     }
 
-    /// A sequence that leads from these places to the goals. Another attempt rolls other dice, and
-    /// takes longer.
+    /// A sequence that leads from these places to the goals. Another attempt finds another one, or
+    /// goes on from where the one before it ended.
     pub(crate) fn find(
         &mut self,
         scene: &Scene,

@@ -1,9 +1,9 @@
 //! Sequences by perturbing: some object is moved somewhere, and then all others are led to their
 //! goals as far as that goes.
 //!
-//! Responsible for: trees of arrangements, one that grows from the start and one that grows back
-//! from the goals; which object is moved where.
-//! Not responsible for: leading one arrangement to another (`monotone`).
+//! Responsible for: which object is moved where, in which arrangement.
+//! Not responsible for: leading one arrangement to another (`monotone`), keeping arrangements
+//! (`trees`).
 //!
 //! How: moves can be made backwards (rule 28), so a sequence is found as soon as an arrangement of
 //! one tree can be led to one of the other. An object goes to a place that it can be brought to and
@@ -14,7 +14,6 @@
 //! Rearrangement", RSS 2015; R. Wang et al., "Uniform Object Rearrangement: From Complete Monotone
 //! Primitives to Efficient Non-Monotone Informed Search", ICRA 2021.
 
-use std::collections::HashSet;
 use std::rc::Rc;
 
 use rand::RngExt;
@@ -22,6 +21,7 @@ use rand::seq::IndexedRandom;
 use scene::{Event, ROBOT_ALONE, Scene};
 
 use crate::anytime::ground::Ground;
+use crate::anytime::sequence::trees::Trees;
 use crate::anytime::sequence::{Sequencer, Step, is_same};
 use crate::anytime::track::Place;
 use crate::frontier::NOWHERE;
@@ -30,31 +30,14 @@ use crate::frontier::NOWHERE;
 pub(super) const FIRST_NODES: usize = 64;
 /// At most.
 const MOST_NODES: usize = 4096;
+/// One in so many arrangements that are gone on from is that at the root.
+const FROM_ROOT: usize = 3;
+/// One in so many objects that are moved is any, the others are not where they have to go.
+const ANYTHING: usize = 4;
 /// Objects in arrangements that are compared for the work of one lattice point.
 const COMPARED_PER_CELL: usize = 8;
 /// Points looked at for a place.
 const POINTS_LOOKED_AT: usize = 24;
-
-/// An arrangement.
-struct Node {
-    places: Vec<Rc<Place>>,
-    /// The one it was reached from, and how.
-    parent: usize,
-    steps: Vec<Step>,
-}
-
-/// Arrangements that can be reached from the start, and from which the goals can be reached.
-pub(super) struct Trees {
-    nodes: [Vec<Node>; 2],
-    known: [HashSet<Vec<u32>>; 2],
-    /// Whether both grow: backwards it is not known what the user's order would say, nor where
-    /// objects without a goal are.
-    is_two_way: bool,
-    /// Which one grew last.
-    side: usize,
-    /// So many arrangements they may have; then others may be luckier.
-    most: usize,
-}
 
 impl Sequencer {
     /// A sequence, if one is found in time. The next attempt goes on from the same trees.
@@ -83,8 +66,7 @@ impl Sequencer {
         let most = self.most_nodes;
         self.most_nodes = (2 * most).min(MOST_NODES);
         let mut trees = Trees::new(&self.start, &self.goals, self.before.is_empty(), most);
-        let [start, goals] = trees.roots();
-        let (steps, is_there) = self.lead(ground, &start, &goals);
+        let (steps, is_there) = self.lead(ground, trees.places(0, 0), trees.places(1, 0));
         if is_there {
             return Ok(steps);
         }
@@ -103,27 +85,21 @@ impl Sequencer {
         // Whatever comes of it: it is to end.
         self.floods += 1;
         self.cells += self.start.len() as u64;
-        let count = trees.nodes[side].len();
-        let parent = if self.random.random_range(0..3) == 0 {
+        let parent = if self.random.random_range(0..FROM_ROOT) == 0 {
             0
         } else {
-            self.random.random_range(0..count)
+            self.random.random_range(0..trees.len(side))
         };
-        let places = trees.nodes[side][parent].places.clone();
-        let toward = trees.nodes[1 - side][0].places.clone();
-        let Some(step) = self.perturbation(scene, ground, &places, &toward) else {
-            return None;
-        };
+        let (places, goals) = (trees.places(side, parent), trees.places(1 - side, 0));
+        let step = self.perturbation(scene, ground, places, goals)?;
         let node = self.add(trees, side, parent, vec![step])?;
-        let places = trees.nodes[side][node].places.clone();
-        let other = trees.nearest(1 - side, &places);
-        let compared = trees.nodes[1 - side].len() * places.len();
+        let places = trees.places(side, node);
+        let other = trees.nearest(1 - side, places);
+        let compared = trees.len(1 - side) * places.len();
         self.cells += (compared / COMPARED_PER_CELL) as u64;
-        let toward = trees.nodes[1 - side][other].places.clone();
-        let (steps, is_there) = self.lead(ground, &places, &toward);
+        let (steps, is_there) = self.lead(ground, places, trees.places(1 - side, other));
         if is_there {
-            let ends = if side == 0 { (node, other) } else { (other, node) };
-            return Some(trees.joined(ends, side, steps));
+            return Some(trees.joined(side, (node, other), steps));
         }
         self.add(trees, side, node, steps);
         None
@@ -137,24 +113,11 @@ impl Sequencer {
         parent: usize,
         steps: Vec<Step>,
     ) -> Option<usize> {
-        let mut places = trees.nodes[side][parent].places.clone();
-        for (object, to) in &steps {
-            places[*object] = Rc::clone(to);
-        }
-        let key = places.iter().flat_map(|place| place.grasps.iter().copied());
-        if !trees.known[side].insert(key.collect()) {
-            return None;
-        }
-        let missing = (0..places.len()).filter(|&object| !self.is_at_goal(object, &places));
-        let missing = missing.count();
-        let node = trees.nodes[side].len();
-        trees.nodes[side].push(Node {
-            places,
-            parent,
-            steps,
-        });
+        let node = trees.add(side, parent, steps)?;
         if side == 0 {
-            self.note(missing, || trees.steps_to(0, node));
+            let places = trees.places(0, node);
+            let away = (0..places.len()).filter(|&object| !self.is_at_goal(object, places));
+            self.note(away.count(), || trees.steps_to(0, node));
         }
         Some(node)
     }
@@ -169,7 +132,7 @@ impl Sequencer {
     ) -> Option<Step> {
         let is_away = |&object: &usize| !is_same(&places[object], &toward[object]);
         let away: Vec<usize> = (0..places.len()).filter(is_away).collect();
-        let object = if self.random.random_range(0..4) == 0 || away.is_empty() {
+        let object = if away.is_empty() || self.random.random_range(0..ANYTHING) == 0 {
             self.random.random_range(0..places.len())
         } else {
             *away.choose(&mut self.random)?
@@ -194,7 +157,10 @@ impl Sequencer {
             let at = scene.lattice.at(cell) - grasp;
             let place = Place::of(scene, ground, object, at).held(by);
             let kept = &place.cells[ROBOT_ALONE.0];
-            let is_clear = self.homes.iter().all(|home| kept.binary_search(home).is_err());
+            let is_clear = self
+                .homes
+                .iter()
+                .all(|home| kept.binary_search(home).is_err());
             if place.grasp != NOWHERE && is_clear && self.can_move(ground, places, object, &place) {
                 return Some((object, place));
             }
@@ -230,7 +196,9 @@ impl Sequencer {
         self.reaches(ground, class, &[to.grasp], &[]);
         let mark = self.mark(0);
         let cells = within.iter().copied();
-        cells.filter(|&cell| self.seen[cell as usize] == mark).collect()
+        cells
+            .filter(|&cell| self.seen[cell as usize] == mark)
+            .collect()
     }
 
     /// The same without moves that turn out not to be needed.
@@ -261,93 +229,4 @@ impl Sequencer {
             is_made
         })
     }
-}
-
-impl Trees {
-    fn new(start: &[Rc<Place>], goals: &[Option<Rc<Place>>], is_free: bool, most: usize) -> Self {
-        let root = |places| {
-            vec![Node {
-                places,
-                parent: 0,
-                steps: Vec::new(),
-            }]
-        };
-        let end = goals.iter().zip(start);
-        let end = end.map(|(goal, start)| Rc::clone(goal.as_ref().unwrap_or(start)));
-        Self {
-            nodes: [root(start.to_vec()), root(end.collect())],
-            known: Default::default(),
-            is_two_way: is_free && goals.iter().all(Option::is_some),
-            side: 1,
-            most,
-        }
-    }
-
-    fn are_full(&self) -> bool {
-        self.nodes.iter().map(Vec::len).sum::<usize>() >= self.most
-    }
-
-    /// The arrangements at the start and at the goals.
-    fn roots(&self) -> [Vec<Rc<Place>>; 2] {
-        [0, 1].map(|side: usize| self.nodes[side][0].places.clone())
-    }
-
-    /// Which tree is to grow.
-    const fn turn(&mut self) -> usize {
-        self.side = if self.is_two_way { 1 - self.side } else { 0 };
-        self.side
-    }
-
-    /// The arrangement in which fewest objects are elsewhere.
-    fn nearest(&self, side: usize, places: &[Rc<Place>]) -> usize {
-        let elsewhere = |node: &Node| {
-            let both = node.places.iter().zip(places);
-            both.filter(|(a, b)| !is_same(a, b)).count()
-        };
-        (0..self.nodes[side].len())
-            .min_by_key(|&node| elsewhere(&self.nodes[side][node]))
-            .unwrap_or(0)
-    }
-
-    /// The steps from a tree's root to one of its arrangements.
-    fn steps_to(&self, side: usize, mut node: usize) -> Vec<Step> {
-        let mut parts = Vec::new();
-        while node != 0 {
-            parts.push(&self.nodes[side][node].steps);
-            node = self.nodes[side][node].parent;
-        }
-        parts.into_iter().rev().flatten().cloned().collect()
-    }
-
-    /// The steps from the start to the goals by an arrangement of each tree, one of which was led
-    /// to the other.
-    fn joined(
-        &self,
-        (first, last): (usize, usize),
-        side: usize,
-        lead: Vec<Step>,
-    ) -> Vec<Step> {
-        let mut steps = self.steps_to(0, first);
-        let mut back = self.steps_to(1, last);
-        if side == 0 {
-            steps.extend(lead);
-        } else {
-            back.extend(lead);
-        }
-        steps.extend(reversed(&self.nodes[1][0].places, &back));
-        steps
-    }
-}
-
-/// Steps backwards: from where they lead to where they begin.
-fn reversed(from: &[Rc<Place>], steps: &[Step]) -> Vec<Step> {
-    let mut places = from.to_vec();
-    let mut back: Vec<Step> = (steps.iter())
-        .map(|(object, to)| {
-            let from = std::mem::replace(&mut places[*object], Rc::clone(to));
-            (*object, from.held(to.by))
-        })
-        .collect();
-    back.reverse();
-    back
 }
