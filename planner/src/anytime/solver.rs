@@ -236,7 +236,7 @@ impl Solver {
         if count == 0 || attempt > 0 && !attempt.is_power_of_two() {
             return;
         }
-        let is_dealt = attempt > 0 && attempt.ilog2() % 2 == 0;
+        let is_dealt = attempt > 0 && attempt.ilog2().is_multiple_of(2);
         for kind in (0..count).filter(|_| is_dealt) {
             let of_kind = |object: &usize| scene.objects[*object].kind == Some(kind);
             let members: Vec<usize> = (0..goals.len()).filter(of_kind).collect();

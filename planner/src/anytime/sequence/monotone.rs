@@ -106,7 +106,7 @@ impl Sequencer {
             let Some(to) = self.next_move(ground, lead, object) else {
                 continue;
             };
-            // The others come first again, as they were: those before it could not move.
+            // Those before it could not move a moment ago: they come last.
             let before = lead.left.clone();
             lead.left.remove(number);
             lead.left.rotate_left(number);

@@ -45,10 +45,14 @@ impl Sequencer {
         let mut kept = self.trees.take();
         while self.floods < self.most_floods {
             let Some(mut trees) = kept.take().filter(|trees| !trees.are_full()) else {
-                match self.plant(ground) {
-                    Ok(steps) => return Some(steps),
-                    Err(trees) => kept = Some(trees),
+                let mut trees = self.plant();
+                let ends = [0, 1].map(|side| trees.places(side, 0));
+                let (steps, is_there) = self.lead(ground, ends[0], ends[1]);
+                if is_there {
+                    return Some(steps);
                 }
+                self.add(&mut trees, 0, 0, steps);
+                kept = Some(trees);
                 continue;
             };
             let side = trees.turn();
@@ -61,17 +65,11 @@ impl Sequencer {
         None
     }
 
-    /// Begins new trees, unless each object can go straight to its goal: then these moves.
-    fn plant(&mut self, ground: &Ground) -> Result<Vec<Step>, Trees> {
+    /// New trees, which may grow larger than the ones before.
+    fn plant(&mut self) -> Trees {
         let most = self.most_nodes;
         self.most_nodes = (2 * most).min(MOST_NODES);
-        let mut trees = Trees::new(&self.start, &self.goals, self.before.is_empty(), most);
-        let (steps, is_there) = self.lead(ground, trees.places(0, 0), trees.places(1, 0));
-        if is_there {
-            return Ok(steps);
-        }
-        self.add(&mut trees, 0, 0, steps);
-        Err(trees)
+        Trees::new(&self.start, &self.goals, self.before.is_empty(), most)
     }
 
     /// Moves some object in some arrangement of a tree, and leads what comes of it to the other one.
