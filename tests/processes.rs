@@ -142,8 +142,8 @@ fn ctrl_c_and_sigterm_end_every_process_and_leave_nothing() {
         let (status, result, stderr) = run.end();
         assert_eq!(status, 130, "{} {stderr}", result["reason"]);
         assert_eq!(result["outcome"], "interrupted");
-        // The partial result is a whole one, of a checked run.
-        assert!(result["ticks"].as_u64().unwrap() > 0);
+        // The partial result is a whole one, of a checked run, be it of no tick yet.
+        assert!(result["ticks"].is_u64());
         assert_eq!(result["checker"]["violations"], 0);
         assert_eq!(result["checker"]["complete"], true);
         run.assert_nothing_left();

@@ -122,7 +122,7 @@ impl Follower {
             Fate::Granted | Fate::Refused => {}
         }
         if me.actions >= part.first + part.count {
-            return at_end(now, part);
+            return at_end(now, (schedule, part));
         }
         let asked = intent.asked.request();
         let is_refused = asked.schedule_version == schedule.version && asked.actions > me.actions;
@@ -159,12 +159,14 @@ fn without_schedule(now: &Now<'_>) -> Doing {
     })
 }
 
-/// All that is listed is granted: it is done, or waits for the planner to list more.
-fn at_end(now: &Now<'_>, part: &RobotSchedule) -> Doing {
+/// All that is listed is granted: it is done, or waits for others to make way, or for the planner
+/// to list more.
+fn at_end(now: &Now<'_>, (schedule, part): (&Schedule, &RobotSchedule)) -> Doing {
     let change = now.counted().change;
+    let is_early = now.snapshot.header.tick < schedule.listed_until_tick;
     match (now.me().grant_count, part.complete) {
         (0, 1) => Doing::idle(change),
-        (0, _) => waiting_for_planner(change),
+        (0, _) if !is_early => waiting_for_planner(change),
         _ => Doing::waiting(u64::MAX),
     }
 }

@@ -328,6 +328,11 @@ fn without_a_schedule_it_computes_and_is_settled_while_none_is_in_force() {
     bench.schedule.as_deref_mut().unwrap().robots[0] = RobotSchedule::default();
     assert_eq!(bench.step().1, Activity::Computing);
     assert_eq!(bench.command.settled_at_change, 7);
+    // So it is to, but nothing is to begin before that.
+    let plan = bench.schedule.as_deref_mut().unwrap();
+    plan.listed_until_tick = bench.snapshot.header.tick + 1;
+    assert_eq!(bench.step().1, Activity::Waiting);
+    assert_eq!(bench.command.settled_at_change, u64::MAX);
 }
 
 #[test]

@@ -102,6 +102,10 @@ pub struct Schedule {
     pub wait_count: u32,
     /// First tick at which it may be named by a snapshot.
     pub effect_tick: u64,
+    /// Until this tick all is listed that begins by then: a robot that has done all that is listed
+    /// for it waits for others until then, and for the planner after that. 0 where as much is
+    /// listed as there is room for.
+    pub listed_until_tick: u64,
     /// The first `robot_count` are live.
     pub robots: [RobotSchedule; MAX_ROBOTS],
     /// The first `action_count` are live.
@@ -155,6 +159,7 @@ impl Schedule {
         self.action_count = other.action_count;
         self.wait_count = other.wait_count;
         self.effect_tick = other.effect_tick;
+        self.listed_until_tick = other.listed_until_tick;
         self.robots[..robots].copy_from_slice(&other.robots[..robots]);
         self.actions[..actions].copy_from_slice(&other.actions[..actions]);
         self.waits[..waits].copy_from_slice(&other.waits[..waits]);
@@ -167,7 +172,7 @@ impl Schedule {
     pub fn hash_into(&self, hash: &mut StateHash) {
         hash.add(&[self.version, self.robot_count]);
         hash.add(&[self.action_count, self.wait_count]);
-        hash.add(&self.effect_tick);
+        hash.add(&[self.effect_tick, self.listed_until_tick]);
         hash.add(&self.robots[..self.robot_count as usize]);
         hash.add(&self.actions[..self.action_count as usize]);
         hash.add(&self.waits[..self.wait_count as usize]);

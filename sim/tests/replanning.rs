@@ -56,12 +56,13 @@ fn a_planner_that_is_started_again_goes_on_from_where_everything_is() {
     }
 }
 
-/// A robot is lost, and comes back: what it held and where it stood is taken into account.
+/// A robot is lost, and comes back before the others find out that they cannot do without it: what
+/// it held and where it stood is taken into account.
 #[test]
 fn robots_that_are_lost_and_come_back_take_part_again() {
     for seed in 0..6 {
         let room = random_room(seed);
-        let report = run_disturbed(&room, &[300, 700, 1000, 1300], |run, turn| {
+        let report = run_disturbed(&room, &[300, 350, 1000, 1050], |run, turn| {
             let robot = turn / 2 % room.homes.len();
             if turn % 2 == 0 {
                 run.lose_robot(robot);

@@ -4,44 +4,22 @@
 //! comes after.
 //! Not responsible for: planning what comes after (`solver`), publishing it (`publish`).
 //!
-//! How: each robot keeps what it will have got to by the time the new plan is out, up to the end
-//! of an action, and up to the release if it holds something then. Whatever that waits for is kept
-//! as well. So what is kept waits for nothing else, and leaves robots parked where nothing kept
-//! needs to pass: it is a plan of its own.
+//! How: each robot keeps what it will have got to by the time the new plan is out, which is all that
+//! was listed for it, up to the end of an action, and up to the release if it holds something
+//! then. Whatever that waits for is kept as well. So what is kept waits for nothing else, and
+//! leaves robots parked where nothing kept needs to pass: it is a plan of its own.
 
-use shm_types::{RobotState, Wait};
+use shm_types::Wait;
 
 use crate::anytime::ground::Time;
 use crate::anytime::publish::Script;
 use crate::anytime::track::{Deed, Track};
 
-/// Actions that a robot may be granted before a schedule that is published is in force, if no grip
-/// lies between: one batch, and the next one in the same tick.
-pub(crate) const ACTIONS_AHEAD: u32 = 9;
-
 /// By robot, how many deeds it keeps if everything that begins before `until` is to stay as it is.
-pub(crate) fn kept(
-    script: &Script,
-    tracks: &[Track],
-    robots: &[RobotState],
-    until: Time,
-) -> Vec<usize> {
+pub(crate) fn kept(script: &Script, tracks: &[Track], until: Time) -> Vec<usize> {
     let mut kept = vec![0; tracks.len()];
-    let mut open: Vec<(usize, usize)> = Vec::new();
-    for (robot, (track, state)) in tracks.iter().zip(robots).enumerate() {
-        let granted = script.granted(robot);
-        let begun = track.deeds.partition_point(|deed| deed.begin() < until);
-        let ahead = state.actions + ACTIONS_AHEAD;
-        let asked = granted[..track.deeds.len()].partition_point(|&count| count <= ahead);
-        // Nothing past a grip is asked for before it is done.
-        let grips = track.deeds.iter().enumerate().skip(begun);
-        let grip = grips
-            .filter(|(deed, done)| done.direction().is_none() && granted[*deed] > state.actions)
-            .map(|(deed, _)| deed + 1)
-            .next();
-        let least = begun.max(asked.min(grip.unwrap_or(asked)));
-        open.push((robot, least));
-    }
+    let begun = |track: &Track| track.deeds.partition_point(|deed| deed.begin() < until);
+    let mut open: Vec<(usize, usize)> = tracks.iter().map(begun).enumerate().collect();
     while let Some((robot, least)) = open.pop() {
         let track = &tracks[robot];
         let granted = script.granted(robot);
@@ -109,13 +87,11 @@ fn put_down(tracks: &[Track], object: u32, turn: u32) -> Option<(usize, usize)> 
 
 #[cfg(test)]
 mod tests {
-    use shm_types::RobotState;
-
     use super::*;
     use crate::anytime::solver::testing::{planned, written};
 
     #[test]
-    fn what_is_kept_waits_for_nothing_else_and_ends_with_free_hands() {
+    fn what_is_kept_is_all_that_is_listed_waits_for_nothing_else_and_ends_with_free_hands() {
         let mut waited = 0;
         for seed in 0..6 {
             let options = scene::GenerateOptions {
@@ -124,17 +100,20 @@ mod tests {
                 ..scene::GenerateOptions::default()
             };
             let (scene, mut solver, makespan) = planned(&options);
-            let script = written(&scene, &mut solver);
+            let mut script = written(&scene, &mut solver);
             let tracks = solver.plan.tracks();
             for share in 0..10 {
-                let robots = vec![RobotState::default(); tracks.len()];
-                let kept = kept(&script, tracks, &robots, makespan / 10 * share);
+                let until = makespan / 10 * share;
+                script.limit(tracks, (until, 0));
+                let kept = kept(&script, tracks, until);
                 let actions = |robot: usize| script.actions_with(robot, kept[robot]);
                 for (robot, track) in tracks.iter().enumerate() {
                     let grips = track.deeds[..kept[robot]]
                         .iter()
                         .filter(|deed| deed.direction().is_none());
                     assert_eq!(grips.count() % 2, 0, "{seed}: {robot} holds something");
+                    let is_all = kept[robot] == track.deeds.len();
+                    assert!(is_all || script.listable(robot) as usize <= actions(robot));
                     for action in 0..actions(robot) {
                         for wait in script.waits(robot, action) {
                             waited += 1;

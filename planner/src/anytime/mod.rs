@@ -1,13 +1,14 @@
 //! Planning ahead for all robots: the method `anytime`.
 //!
-//! Responsible for: a first plan, better ones for as long as that pays before anybody moves, the
-//! schedule that robots follow.
+//! Responsible for: a first plan, better ones while robots set off with it, the schedule that they
+//! follow.
 //! Not responsible for: following it (crate `robot`), granting space (crate `world`).
 //!
 //! How: `sequence` finds moves that can be made one after the other, `order` says who makes which,
 //! `plan` commits them in space and time, each around all that was committed before, so that
-//! robots move at the same time (rule 31). What takes long is the order: it is searched for as long
-//! as what it can still save is worth more than the waiting.
+//! robots move at the same time (rule 31). What takes long is a good order. Robots set off with the
+//! first one, and are told no more of it than they need until the next round of looking for better
+//! ones is over: all the rest can still change.
 //!
 //! Unlike what the paper's methods compute with, this allocates while it plans.
 
@@ -31,24 +32,19 @@ mod track;
 use scene::{Budget, Scene, Settings};
 use shm_types::{Checked, Counters, RobotSchedule, RobotState, Schedule, Verdict, WorldSnapshot};
 
+use crate::anytime::ground::Time;
 use crate::anytime::keep::kept;
 use crate::anytime::publish::Script;
 use crate::anytime::situation::{Situation, stands_still};
 use crate::anytime::solver::Solver;
 use crate::proof::Proof;
 
-/// Share of the makespan that is spent on improving the plan before anybody moves, for each robot:
-/// more robots have more orders.
-const PATIENCE_PER_ROBOT: f64 = 0.005;
-/// At most.
-const MOST_PATIENCE: f64 = 0.01;
-/// It is given up when this much was spent on the first plan and on improving it, s: with very many
-/// objects one try takes long, and saves little.
+/// A plan of the fewest steps is looked for until this much is spent before anybody moves, s.
 const MOST_BEFORE_MOTION_S: f64 = 1.0;
-/// The same while robots follow it, which costs the run nothing.
-const PATIENCE_UNDER_WAY: f64 = 0.03;
+/// Share of the makespan for which better plans are looked for while robots follow the first one.
+const PATIENCE: f64 = 0.06;
 /// At most, s.
-const MOST_PATIENCE_UNDER_WAY_S: f64 = 10.0;
+const MOST_PATIENCE_S: f64 = 10.0;
 /// World time that improving takes between two looks at where robots are, s.
 const ROUND_S: f64 = 0.25;
 /// From when a round begins until robots may follow what it found, beyond its work, s.
@@ -91,8 +87,6 @@ enum Stage {
     Prove,
     /// A first plan by the complete search.
     Search,
-    /// Better ones, until that many units are spent in all.
-    Better(u64),
     /// A shortest one, of a small room in which everything takes as long.
     Shorten,
     /// Writing it down.
@@ -104,6 +98,11 @@ enum Stage {
     Round(u64, u64),
     /// Nothing.
     Done(Verdict),
+}
+
+/// For how long better plans are looked for.
+fn patience_s(makespan_s: f64) -> f64 {
+    (makespan_s * PATIENCE).min(MOST_PATIENCE_S)
 }
 
 /// How planning stands after a step.
@@ -218,12 +217,13 @@ impl Anytime {
         let Some(script) = &self.script else {
             return false;
         };
-        let is_short = |(state, listed): (&RobotState, &RobotSchedule)| {
-            listed.complete == 0 && state.actions >= listed.first + listed.count / 2
+        let is_short = |(robot, (state, listed)): (usize, (&RobotState, &RobotSchedule))| {
+            listed.first + listed.count < script.listable(robot)
+                && state.actions >= listed.first + listed.count / 2
         };
         // A robot that has come since is in no list.
         let listed = &out.robots[..out.robot_count as usize];
-        let is_due = robots.iter().zip(listed).any(is_short);
+        let is_due = robots.iter().zip(listed).enumerate().any(is_short);
         if is_due {
             script.write(|robot| robots[robot].actions, out);
         }
@@ -233,8 +233,9 @@ impl Anytime {
     /// What was published was refused: goes back to the plan before, or else plans anew.
     pub(crate) fn take_back(&mut self, snapshot: Checked<WorldSnapshot>, out: &mut Schedule) {
         if self.stage != Stage::Stop
-            && let Some(script) = self.replaced.take()
+            && let Some(mut script) = self.replaced.take()
         {
+            script.lift_limit();
             let robots = snapshot.robots();
             script.write(|robot| robots[robot].actions, out);
             self.script = Some(script);
@@ -297,6 +298,7 @@ impl Anytime {
         let robots = snapshot.robots();
         out.robot_count = robots.len() as u32;
         (out.action_count, out.wait_count) = (0, 0);
+        out.listed_until_tick = 0;
         for (listed, state) in out.robots.iter_mut().zip(robots) {
             *listed = RobotSchedule {
                 first: state.actions,
@@ -378,18 +380,10 @@ impl Anytime {
     ) -> bool {
         let units_per_second = self.settings.units_per_second;
         let units = |s: f64| (s * units_per_second as f64) as u64;
-        let better = |solver: &Solver, makespan| {
-            let patience = PATIENCE_PER_ROBOT * solver.homes.len() as f64;
-            let worth_s = solver.ground.seconds(makespan) * patience.min(MOST_PATIENCE);
-            let until = solver.units() + units(worth_s);
-            // The last order that is tried should be done by then.
-            let most = units(MOST_BEFORE_MOTION_S).saturating_sub(solver.order_units);
-            Stage::Better(until.min(most))
-        };
         let mut is_written = false;
         self.stage = match self.stage {
             Stage::First(attempt) => match solver.first(scene, attempt) {
-                Some(makespan) => better(solver, makespan),
+                Some(_) => Stage::Shorten,
                 None => self.go_on_after(attempt + 1, solver, scene),
             },
             Stage::Prove => {
@@ -402,12 +396,10 @@ impl Anytime {
             }
             Stage::Search => match solver.search(scene) {
                 None => Stage::Search,
-                Some(Ok(makespan)) => better(solver, makespan),
+                Some(Ok(_)) => Stage::Shorten,
                 Some(Err(Verdict::Exhausted)) => Stage::Done(Verdict::Exhausted),
                 Some(Err(_)) => Stage::First(ATTEMPTS_BEFORE_SEARCH),
             },
-            Stage::Better(until) if solver.units() < until && solver.improve(scene) => self.stage,
-            Stage::Better(_) => Stage::Shorten,
             Stage::Shorten
                 if solver.units() < units(MOST_BEFORE_MOTION_S) && solver.shorten(scene) =>
             {
@@ -417,33 +409,37 @@ impl Anytime {
             Stage::Write => match solver.restore() {
                 None => Stage::Done(Verdict::NotFound),
                 Some(makespan) => {
-                    let script = Script::of(scene, &solver.ground, &solver.plan, &self.situation);
+                    let (ground, plan) = (&solver.ground, &solver.plan);
+                    let mut script = Script::of(scene, ground, plan, &self.situation);
+                    script.limit(plan.tracks(), self.next(solver, snapshot));
                     let robots = snapshot.robots();
                     script.write(|robot| robots[robot].actions, out);
                     self.script = Some(script);
                     is_written = true;
-                    let worth_s = solver.ground.seconds(makespan) * PATIENCE_UNDER_WAY;
-                    let worth_s = worth_s.min(MOST_PATIENCE_UNDER_WAY_S);
-                    Stage::Follow(solver.units() + units(worth_s))
+                    let most_s = patience_s(solver.ground.seconds(makespan));
+                    Stage::Follow(solver.units() + units(most_s))
                 }
             },
-            Stage::Follow(until) if solver.units() < until => {
-                if self.begin_round(solver, scene, snapshot) {
-                    Stage::Round(solver.units() + units(ROUND_S), until)
+            Stage::Follow(last) => {
+                if solver.units() < last && self.begin_round(solver, scene, snapshot) {
+                    Stage::Round(solver.units() + units(ROUND_S), last)
                 } else {
+                    is_written = self.list_all(snapshot.robots(), out);
                     Stage::Done(Verdict::Open)
                 }
             }
-            Stage::Follow(_) => Stage::Done(Verdict::Open),
             Stage::Round(until, last) if solver.units() < until && solver.improve(scene) => {
                 Stage::Round(until, last)
             }
             Stage::Round(until, last) => {
-                is_written = self.end_round(solver, scene, snapshot, out);
-                if is_written || solver.units() >= until {
-                    Stage::Follow(last)
-                } else {
+                let is_exhausted = solver.units() < until;
+                let is_better = self.take_better(solver, scene, snapshot, out);
+                if is_exhausted && !is_better {
+                    is_written = self.list_all(snapshot.robots(), out);
                     Stage::Done(Verdict::Open)
+                } else {
+                    is_written = is_better || self.list_on(solver, snapshot, out);
+                    Stage::Follow(last)
                 }
             }
             Stage::Inherited | Stage::Stop | Stage::Settle(..) | Stage::New | Stage::Done(_) => {
@@ -482,20 +478,27 @@ impl Anytime {
         scene: &Scene,
         snapshot: Checked<WorldSnapshot>,
     ) -> bool {
+        self.begun_ns.get_or_insert(snapshot.header.time_ns);
+        let (until, _) = self.next(solver, snapshot);
         let Some(script) = &self.script else {
             return false;
         };
-        let now_ns = snapshot.header.time_ns;
-        let begun_ns = *self.begun_ns.get_or_insert(now_ns);
-        let since_s = (now_ns - begun_ns) as f64 * 1e-9;
-        let until = solver.ground.time(since_s + ROUND_S + REACTION_S);
-        solver.go_on(scene, |tracks| {
-            kept(script, tracks, snapshot.robots(), until)
-        })
+        solver.go_on(scene, until, |tracks| kept(script, tracks, until))
     }
 
-    /// Writes down what a round has found, if that is better and robots can still follow it.
-    fn end_round(
+    /// Until when robots go on as they were told: a round that begins now is over by then, and what
+    /// it found is in force. As time in the plan, and as a tick.
+    fn next(&self, solver: &Solver, snapshot: Checked<WorldSnapshot>) -> (Time, u64) {
+        let header = &snapshot.header;
+        let since_ns = (self.begun_ns).map_or(0, |begun_ns| header.time_ns - begun_ns);
+        let ahead_s = ROUND_S + REACTION_S;
+        let ticks = (ahead_s * 1e9) as u64 / self.settings.tick_ns.max(1);
+        let until = solver.ground.time(since_ns as f64 * 1e-9 + ahead_s);
+        (until, header.tick + ticks)
+    }
+
+    /// Writes down what a round has found, if that is better: it keeps all that was listed before.
+    fn take_better(
         &mut self,
         solver: &mut Solver,
         scene: &Scene,
@@ -508,15 +511,40 @@ impl Anytime {
         if !solver.has_better() || solver.restore().is_none() {
             return false;
         }
-        let better = script.go_on(scene, &solver.ground, &solver.plan);
+        let mut better = script.go_on(scene, &solver.ground, &solver.plan);
         let robots = snapshot.robots();
-        if !script.agrees(&better, robots) {
-            solver.drop_better();
-            return false;
-        }
         solver.accept_better();
+        better.limit(solver.followed(), self.next(solver, snapshot));
         better.write_new(|robot| robots[robot].actions, out);
         self.replaced = self.script.replace(better);
+        true
+    }
+
+    /// Lists what robots need of their plan until the end of the next round. Whether it did: all
+    /// may be listed.
+    fn list_on(
+        &mut self,
+        solver: &Solver,
+        snapshot: Checked<WorldSnapshot>,
+        out: &mut Schedule,
+    ) -> bool {
+        let until = self.next(solver, snapshot);
+        let Some(script) = self.script.as_mut().filter(|script| script.is_limited()) else {
+            return false;
+        };
+        script.limit(solver.followed(), until);
+        let robots = snapshot.robots();
+        script.write(|robot| robots[robot].actions, out);
+        true
+    }
+
+    /// Lists all of the plan. Whether it did: it may be listed already.
+    fn list_all(&mut self, robots: &[RobotState], out: &mut Schedule) -> bool {
+        let Some(script) = self.script.as_mut().filter(|script| script.is_limited()) else {
+            return false;
+        };
+        script.lift_limit();
+        script.write(|robot| robots[robot].actions, out);
         true
     }
 }

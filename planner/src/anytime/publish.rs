@@ -14,17 +14,19 @@ mod needs;
 
 use scene::{CONTACT_M, Scene, Vec2, point};
 use shm_types::capacity::MAX_ACTIONS;
-use shm_types::{Action, Grip, NONE, RobotSchedule, RobotState, Schedule, Wait};
+use shm_types::{Action, Grip, NONE, RobotSchedule, Schedule, Wait};
 
-use crate::anytime::ground::Ground;
-use crate::anytime::keep::ACTIONS_AHEAD;
+use crate::anytime::ground::{Ground, Time};
+use crate::anytime::patience_s;
 use crate::anytime::plan::Plan;
 use crate::anytime::publish::needs::{Need, add_user_order, needs_of};
 use crate::anytime::situation::{RobotAt, Situation};
-use crate::anytime::track::Deed;
+use crate::anytime::track::{Deed, Track};
 
 /// Most steps in one action.
 const MAX_STEPS: u32 = 20;
+/// The same of those that robots begin with, while what comes after them can still change.
+const FEW_STEPS: u32 = 2;
 
 /// Actions of one robot, and which one each deed is part of.
 struct Joined {
@@ -55,6 +57,10 @@ pub(crate) struct Script {
     robots: Vec<Part>,
     /// By robot and deed: how many actions are granted once it is.
     granted: Vec<Vec<u32>>,
+    /// By robot, how many of its actions may be listed: those after that can still change.
+    limits: Vec<u32>,
+    /// The tick by which the next ones are to begin; 0 if there are no limits.
+    limited_until_tick: u64,
 }
 
 impl Script {
@@ -64,6 +70,8 @@ impl Script {
         let before = Self {
             robots: situation.robots.iter().map(part).collect(),
             granted: vec![Vec::new(); situation.robots.len()],
+            limits: vec![u32::MAX; situation.robots.len()],
+            limited_until_tick: 0,
         };
         Self::joined(scene, ground, plan, &before, |_| 0)
     }
@@ -130,6 +138,8 @@ impl Script {
         };
         Self {
             robots: joined.iter().zip(&needs).enumerate().map(script).collect(),
+            limits: vec![u32::MAX; joined.len()],
+            limited_until_tick: 0,
             granted: joined.into_iter().map(|part| part.granted).collect(),
         }
     }
@@ -145,33 +155,41 @@ impl Script {
         last.unwrap_or(self.robots[robot].begun) as usize
     }
 
+    /// Lists nothing for now that begins later than `until`, which is this tick. `tracks` are those
+    /// it was made of.
+    pub(crate) fn limit(&mut self, tracks: &[Track], (until, tick): (Time, u64)) {
+        self.limited_until_tick = tick;
+        for (robot, track) in tracks.iter().enumerate() {
+            let begun = track.deeds.partition_point(|deed| deed.begin() < until);
+            self.limits[robot] = if begun < track.deeds.len() {
+                self.actions_with(robot, begun) as u32
+            } else {
+                u32::MAX
+            };
+        }
+    }
+
+    /// Lists everything from now on.
+    pub(crate) fn lift_limit(&mut self) {
+        self.limits.fill(u32::MAX);
+        self.limited_until_tick = 0;
+    }
+
+    /// Whether something is not to be listed.
+    pub(crate) fn is_limited(&self) -> bool {
+        self.limits.iter().any(|&limit| limit != u32::MAX)
+    }
+
+    /// How many of a robot's actions may be listed.
+    pub(crate) fn listable(&self, robot: usize) -> u32 {
+        let part = &self.robots[robot];
+        self.limits[robot].min(part.first + part.actions.len() as u32)
+    }
+
     /// What an action waits for.
     pub(crate) fn waits(&self, robot: usize, action: usize) -> &[Wait] {
         let part = &self.robots[robot];
         &part.actions[action - part.first as usize].1
-    }
-
-    /// Whether robots can go on with `other` where they are: it keeps all that may be granted to
-    /// them before it is in force. What only looks the same does not count: who goes first may be
-    /// another one.
-    pub(crate) fn agrees(&self, other: &Self, robots: &[RobotState]) -> bool {
-        let is_over = |wait: &Wait| robots[wait.robot as usize].actions >= wait.actions;
-        let mut scripts = robots.iter().zip(self.robots.iter().zip(&other.robots));
-        scripts.all(|(state, (mine, others))| {
-            let granted = state.actions.saturating_sub(mine.first) as usize;
-            let ahead = mine.actions.iter().skip(granted);
-            let mut asked = granted;
-            for (action, waits) in ahead.take(ACTIONS_AHEAD as usize) {
-                if !waits.iter().all(is_over) {
-                    break;
-                }
-                asked += 1;
-                if action.grip != Grip::Keep.code() {
-                    break;
-                }
-            }
-            mine.first + asked as u32 <= others.kept
-        })
     }
 
     /// Writes the next actions of each robot, from the last one that is granted to it (so many
@@ -195,11 +213,13 @@ impl Script {
     fn fits(&self, granted: impl Fn(usize) -> u32, window: usize, out: &mut Schedule) -> bool {
         let (mut actions, mut waits) = (0, 0);
         out.robot_count = self.robots.len() as u32;
+        out.listed_until_tick = self.limited_until_tick;
         for (robot, part) in self.robots.iter().enumerate() {
             let first = granted(robot).saturating_sub(1).max(part.first);
             let passed = (first - part.first) as usize;
             let ahead = &part.actions[passed.min(part.actions.len())..];
-            let listed = &ahead[..window.min(ahead.len())];
+            let most = self.listable(robot).saturating_sub(first) as usize;
+            let listed = &ahead[..ahead.len().min(most).min(window)];
             out.robots[robot] = RobotSchedule {
                 first,
                 count: listed.len() as u32,
@@ -258,6 +278,7 @@ fn join(
             None => beside = stops.next().is_some_and(|at| !is_at(scene, cell, at)),
         }
     }
+    let can_change = ground.time(patience_s(ground.seconds(plan.makespan())));
     let mut steps = 0;
     let mut heading = None;
     for (deed, done) in track.deeds.iter().enumerate().skip(kept.len()) {
@@ -273,7 +294,9 @@ fn join(
                 }
                 cell = cell.wrapping_add_signed(ground.offsets[direction as usize]);
                 let to = point(scene.lattice.at(cell));
-                let goes_on = heading == Some(direction) && !waits && steps < MAX_STEPS;
+                let is_early = done.begin() < can_change;
+                let most = if is_early { FEW_STEPS } else { MAX_STEPS };
+                let goes_on = heading == Some(direction) && !waits && steps < most;
                 match joined.actions.last_mut() {
                     Some(action) if goes_on => {
                         action.to = to;
@@ -434,9 +457,8 @@ mod tests {
             solver.restore().unwrap();
             let script = Script::of(&scene, &solver.ground, &solver.plan, &situation);
             ends_at_home(&scene, &script);
-            let robots = vec![RobotState::default(); scene.homes.len()];
             let until = makespan.unwrap() / 3;
-            if solver.go_on(&scene, |tracks| kept(&script, tracks, &robots, until)) {
+            if solver.go_on(&scene, until, |tracks| kept(&script, tracks, until)) {
                 solver.improve(&scene);
                 solver.restore();
                 ends_at_home(&scene, &script.go_on(&scene, &solver.ground, &solver.plan));
@@ -471,6 +493,8 @@ mod tests {
         Script {
             robots: vec![part],
             granted: Vec::new(),
+            limits: vec![u32::MAX],
+            limited_until_tick: 0,
         }
     }
 

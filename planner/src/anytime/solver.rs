@@ -113,8 +113,6 @@ pub(crate) struct Solver {
     pub(super) turn: u32,
     pub(super) tried: HashSet<Vec<Item>>,
     pub(crate) decoded: u64,
-    /// Units that the first plan's moves took.
-    pub(crate) order_units: u64,
     /// Units spent on looking at orders, and on making moves again that were found before.
     pub(super) weighing: u64,
     /// Ways of the moves of orders tried before, from the present start and as `mode` says.
@@ -182,7 +180,6 @@ impl Solver {
             turn: 0,
             tried: HashSet::new(),
             decoded: 0,
-            order_units: 0,
             weighing: 0,
             known: Known::default(),
             mode: MODES[0],
@@ -260,10 +257,8 @@ impl Solver {
         for mode in MODES {
             self.mode = mode;
             self.known.clear();
-            let before = self.units();
             found = self.greedy(scene, &hops, &objects);
             if found.is_some() {
-                self.order_units = self.units() - before;
                 break;
             }
         }

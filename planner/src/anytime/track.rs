@@ -208,8 +208,8 @@ impl Track {
         }
     }
 
-    /// Its first `kept` deeds, after which it holds nothing.
-    pub(crate) fn cut(&self, ground: &Ground, kept: usize) -> Self {
+    /// Its first `kept` deeds, after which it holds nothing, and goes on no sooner than `until`.
+    pub(crate) fn cut(&self, ground: &Ground, kept: usize, until: Time) -> Self {
         let deeds = self.deeds[..kept].to_vec();
         let (mut cell, mut now, mut grips) = (self.start, 0, 0);
         for deed in &deeds {
@@ -228,7 +228,7 @@ impl Track {
             stops: self.stops[..grips].to_vec(),
             kept,
             tail: kept,
-            free: (cell, now),
+            free: (cell, now.max(until)),
             left: None,
             end: (cell, now),
         }

@@ -50,9 +50,10 @@ fn what_is_reserved_after_many_changes_is_what_robots_do_in_the_end() {
     }
 }
 
-/// What is kept waits for nothing that is planned later: so it has to come first.
+/// What is kept waits for nothing that is planned later: so it has to come first. And nothing is
+/// planned for a time that will be over.
 #[test]
-fn what_is_planned_under_way_passes_after_what_is_kept() {
+fn what_is_planned_under_way_comes_after_what_is_kept() {
     let mut shared = 0;
     for seed in 0..8 {
         let options = scene::GenerateOptions {
@@ -63,17 +64,23 @@ fn what_is_planned_under_way_passes_after_what_is_kept() {
         };
         let (scene, mut solver, makespan) = planned(&options);
         let script = written(&scene, &mut solver);
-        let robots = vec![shm_types::RobotState::default(); scene.homes.len()];
-        let goes_on = solver.go_on(&scene, |tracks| {
-            kept(&script, tracks, &robots, makespan / 3)
-        });
+        let until = makespan / 3;
+        let goes_on = solver.go_on(&scene, until, |tracks| kept(&script, tracks, until));
         // Where all moves have begun by then, nothing is left.
         for _ in 0..if goes_on { 20 } else { 0 } {
             solver.improve(&scene);
             shared += assert_kept_first(&solver, seed);
+            assert_not_before(&solver, until);
         }
     }
     assert!(shared > 0, "they never meet");
+}
+
+fn assert_not_before(solver: &Solver, until: Time) {
+    for track in solver.plan.tracks() {
+        let planned = &track.deeds[track.kept..];
+        assert!(planned.iter().all(|deed| deed.begin() >= until));
+    }
 }
 
 /// How often what is planned leads to where somebody else has been before with what is kept.

@@ -7,6 +7,7 @@ use std::rc::Rc;
 
 use scene::Scene;
 
+use crate::anytime::ground::Time;
 use crate::anytime::order::Hops;
 use crate::anytime::sequence::Step;
 use crate::anytime::solver::{Best, Solver};
@@ -14,10 +15,11 @@ use crate::anytime::track::{Start, Track};
 
 impl Solver {
     /// Keeps so many deeds of each robot of the plan that is followed, as `kept` says, and looks
-    /// for what comes after them anew. False if nothing comes after them.
+    /// for what comes after them, and not before `until`, anew. False if nothing comes after them.
     pub(crate) fn go_on(
         &mut self,
         scene: &Scene,
+        until: Time,
         kept: impl FnOnce(&[Track]) -> Vec<usize>,
     ) -> bool {
         let Some(followed) = self.followed.clone() else {
@@ -31,7 +33,7 @@ impl Solver {
             |start: &Start| -> Vec<u32> { start.rests().iter().map(|rest| rest.turns).collect() };
         let before = turns(&self.start);
         self.start.robots = (followed.tracks.iter().zip(kept))
-            .map(|(track, kept)| track.cut(&self.ground, kept))
+            .map(|(track, kept)| track.cut(&self.ground, kept, until))
             .collect();
         // Of each object, the first moves are those kept.
         let mut kept = turns(&self.start);
@@ -67,6 +69,13 @@ impl Solver {
         true
     }
 
+    /// What robots do in the plan that they follow.
+    pub(crate) fn followed(&self) -> &[Track] {
+        self.followed
+            .as_ref()
+            .map_or(&[], |followed| &followed.tracks)
+    }
+
     /// Whether the best plan is better than the one that is followed.
     pub(crate) fn has_better(&self) -> bool {
         let makespan = |best: &Option<Best>| best.as_ref().map(|best| best.makespan);
@@ -76,10 +85,5 @@ impl Solver {
     /// Robots follow the best plan from now on.
     pub(crate) fn accept_better(&mut self) {
         self.followed.clone_from(&self.best);
-    }
-
-    /// Robots go on as before.
-    pub(crate) fn drop_better(&mut self) {
-        self.best.clone_from(&self.followed);
     }
 }
