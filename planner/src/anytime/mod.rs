@@ -12,6 +12,7 @@
 //!
 //! Unlike what the paper's methods compute with, this allocates while it plans.
 
+mod anew;
 mod asides;
 mod ground;
 mod improve;
@@ -21,6 +22,7 @@ mod known;
 mod order;
 mod plan;
 mod publish;
+mod rounds;
 mod route;
 mod sequence;
 mod shortest;
@@ -32,35 +34,21 @@ mod track;
 use scene::{Budget, Scene, Settings};
 use shm_types::{Checked, Counters, RobotSchedule, RobotState, Schedule, Verdict, WorldSnapshot};
 
-use crate::anytime::ground::Time;
-use crate::anytime::keep::kept;
+use crate::anytime::anew::DOUBT_NS;
 use crate::anytime::publish::Script;
-use crate::anytime::situation::{Situation, stands_still};
+use crate::anytime::rounds::{ROUND_S, patience_s};
+use crate::anytime::situation::Situation;
 use crate::anytime::solver::Solver;
 use crate::proof::Proof;
 
 /// A plan of the fewest steps is looked for until this much is spent before anybody moves, s.
 const MOST_BEFORE_MOTION_S: f64 = 1.0;
-/// Share of the makespan for which better plans are looked for while robots follow the first one.
-const PATIENCE: f64 = 0.06;
-/// At most, s.
-const MOST_PATIENCE_S: f64 = 10.0;
-/// World time that improving takes between two looks at where robots are, s.
-const ROUND_S: f64 = 0.25;
-/// From when a round begins until robots may follow what it found, beyond its work, s.
-const REACTION_S: f64 = 0.25;
 /// World time after which no first plan is looked for any more, s.
 const MOST_S: u64 = 60;
 /// Attempts at a first plan before a proof is looked for that there is none.
 const ATTEMPTS_BEFORE_PROOF: u64 = 3;
 /// The same before the complete search begins.
 const ATTEMPTS_BEFORE_SEARCH: u64 = 8;
-/// Ticks for which nothing may change before it counts as standing still.
-const TICKS_TO_SETTLE: u64 = 20;
-/// World time for which nothing may change while a plan for all objects is not carried out before
-/// it counts as one that robots cannot follow, ns: some process did something else than it says.
-/// Each time it comes to that it is doubled.
-const DOUBT_NS: u64 = 2_000_000_000;
 /// One configuration of the complete search, in work units.
 const UNITS_PER_CONFIGURATION: u64 = 40;
 /// One configuration of the search for a shortest plan, in work units.
@@ -98,11 +86,6 @@ enum Stage {
     Round(u64, u64),
     /// Nothing.
     Done(Verdict),
-}
-
-/// For how long better plans are looked for.
-fn patience_s(makespan_s: f64) -> f64 {
-    (makespan_s * PATIENCE).min(MOST_PATIENCE_S)
 }
 
 /// How planning stands after a step.
@@ -228,105 +211,6 @@ impl Anytime {
             script.write(|robot| robots[robot].actions, out);
         }
         is_due
-    }
-
-    /// What was published was refused: goes back to the plan before, or else plans anew.
-    pub(crate) fn take_back(&mut self, snapshot: Checked<WorldSnapshot>, out: &mut Schedule) {
-        if self.stage != Stage::Stop
-            && let Some(mut script) = self.replaced.take()
-        {
-            script.lift_limit();
-            let robots = snapshot.robots();
-            script.write(|robot| robots[robot].actions, out);
-            self.script = Some(script);
-            self.stage = Stage::Done(Verdict::Open);
-        } else {
-            self.stop(snapshot, out);
-        }
-    }
-
-    /// Plans anew from where everything is, since what the plan assumes is no longer so.
-    pub(crate) fn replan(&mut self, snapshot: Checked<WorldSnapshot>) {
-        self.stage = match snapshot.header.schedule_version {
-            // Nothing is followed, nor on its way.
-            0 if self.script.is_none() => Stage::New,
-            _ => Stage::Stop,
-        };
-    }
-
-    /// An earlier process made the plan that robots follow, which this one knows nothing of: it
-    /// leaves them to it, and plans anew once they stand still.
-    pub(crate) fn inherit(&mut self) {
-        if self.stage == Stage::New && self.script.is_none() {
-            self.stage = Stage::Inherited;
-        }
-    }
-
-    /// Whether other robots take part than did when this was asked last.
-    fn is_other_team(&mut self, robots: &[RobotState]) -> bool {
-        let is_same = (self.team.iter()).eq(robots.iter().map(|robot| &robot.live));
-        let is_first = self.team.is_empty();
-        if !is_same {
-            self.team.clear();
-            self.team.extend(robots.iter().map(|robot| robot.live));
-        }
-        !is_same && !is_first
-    }
-
-    /// Whether robots stand still although they have a plan that brings all objects to their goals.
-    fn is_doubtful(&mut self, snapshot: Checked<WorldSnapshot>) -> bool {
-        let header = &snapshot.header;
-        let follows = matches!(
-            self.stage,
-            Stage::Inherited | Stage::Follow(_) | Stage::Round(..) | Stage::Done(Verdict::Open)
-        );
-        let is_on_its_way =
-            header.change != self.quiet.0 || header.held == 1 || !stands_still(&snapshot);
-        if !follows || self.verdict != Verdict::Open || is_on_its_way {
-            self.quiet = (header.change, header.time_ns);
-            return false;
-        }
-        if header.time_ns < self.quiet.1 + self.doubt_ns {
-            return false;
-        }
-        self.doubt_ns = self.doubt_ns.saturating_mul(2);
-        true
-    }
-
-    /// Lists nothing: robots go no further than is granted to them.
-    fn stop(&mut self, snapshot: Checked<WorldSnapshot>, out: &mut Schedule) {
-        let robots = snapshot.robots();
-        out.robot_count = robots.len() as u32;
-        (out.action_count, out.wait_count) = (0, 0);
-        out.listed_until_tick = 0;
-        for (listed, state) in out.robots.iter_mut().zip(robots) {
-            *listed = RobotSchedule {
-                first: state.actions,
-                ..RobotSchedule::default()
-            };
-        }
-        self.script = None;
-        self.replaced = None;
-        self.solver = None;
-        self.begun_ns = None;
-        self.stage = Stage::Settle(u64::MAX, 0);
-    }
-
-    /// Whether everybody stands still, and has for a while.
-    fn has_settled(&mut self, snapshot: Checked<WorldSnapshot>) -> bool {
-        let header = &snapshot.header;
-        let Stage::Settle(until, change) = self.stage else {
-            return true;
-        };
-        if until == u64::MAX || change != header.change || !stands_still(&snapshot) {
-            self.stage = Stage::Settle(header.tick + TICKS_TO_SETTLE, header.change);
-            return false;
-        }
-        if header.tick < until {
-            return false;
-        }
-        self.stage = Stage::New;
-        true
     }
 
     /// A piece of work. Whether something is to be published.
@@ -468,83 +352,5 @@ impl Anytime {
             Some(_) => Stage::Write,
             None => Stage::Done(Verdict::NotFound),
         }
-    }
-
-    /// Begins to look for a better plan that goes on from where robots will be by then. False if
-    /// there is nothing to improve.
-    fn begin_round(
-        &mut self,
-        solver: &mut Solver,
-        scene: &Scene,
-        snapshot: Checked<WorldSnapshot>,
-    ) -> bool {
-        self.begun_ns.get_or_insert(snapshot.header.time_ns);
-        let (until, _) = self.next(solver, snapshot);
-        let Some(script) = &self.script else {
-            return false;
-        };
-        solver.go_on(scene, until, |tracks| kept(script, tracks, until))
-    }
-
-    /// Until when robots go on as they were told: a round that begins now is over by then, and what
-    /// it found is in force. As time in the plan, and as a tick.
-    fn next(&self, solver: &Solver, snapshot: Checked<WorldSnapshot>) -> (Time, u64) {
-        let header = &snapshot.header;
-        let since_ns = (self.begun_ns).map_or(0, |begun_ns| header.time_ns - begun_ns);
-        let ahead_s = ROUND_S + REACTION_S;
-        let ticks = (ahead_s * 1e9) as u64 / self.settings.tick_ns.max(1);
-        let until = solver.ground.time(since_ns as f64 * 1e-9 + ahead_s);
-        (until, header.tick + ticks)
-    }
-
-    /// Writes down what a round has found, if that is better: it keeps all that was listed before.
-    fn take_better(
-        &mut self,
-        solver: &mut Solver,
-        scene: &Scene,
-        snapshot: Checked<WorldSnapshot>,
-        out: &mut Schedule,
-    ) -> bool {
-        let Some(script) = &self.script else {
-            return false;
-        };
-        if !solver.has_better() || solver.restore().is_none() {
-            return false;
-        }
-        let mut better = script.go_on(scene, &solver.ground, &solver.plan);
-        let robots = snapshot.robots();
-        solver.accept_better();
-        better.limit(solver.followed(), self.next(solver, snapshot));
-        better.write_new(|robot| robots[robot].actions, out);
-        self.replaced = self.script.replace(better);
-        true
-    }
-
-    /// Lists what robots need of their plan until the end of the next round. Whether it did: all
-    /// may be listed.
-    fn list_on(
-        &mut self,
-        solver: &Solver,
-        snapshot: Checked<WorldSnapshot>,
-        out: &mut Schedule,
-    ) -> bool {
-        let until = self.next(solver, snapshot);
-        let Some(script) = self.script.as_mut().filter(|script| script.is_limited()) else {
-            return false;
-        };
-        script.limit(solver.followed(), until);
-        let robots = snapshot.robots();
-        script.write(|robot| robots[robot].actions, out);
-        true
-    }
-
-    /// Lists all of the plan. Whether it did: it may be listed already.
-    fn list_all(&mut self, robots: &[RobotState], out: &mut Schedule) -> bool {
-        let Some(script) = self.script.as_mut().filter(|script| script.is_limited()) else {
-            return false;
-        };
-        script.lift_limit();
-        script.write(|robot| robots[robot].actions, out);
-        true
     }
 }

@@ -17,9 +17,9 @@ use shm_types::capacity::MAX_ACTIONS;
 use shm_types::{Action, Grip, NONE, RobotSchedule, Schedule, Wait};
 
 use crate::anytime::ground::{Ground, Time};
-use crate::anytime::patience_s;
 use crate::anytime::plan::Plan;
 use crate::anytime::publish::needs::{Need, add_user_order, needs_of};
+use crate::anytime::rounds::patience_s;
 use crate::anytime::situation::{RobotAt, Situation};
 use crate::anytime::track::{Deed, Track};
 
