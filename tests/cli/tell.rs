@@ -33,7 +33,7 @@ impl Run {
     fn start(place: &Path, more: &[&str]) -> Self {
         let child = Command::new(assert_cmd::cargo::cargo_bin!("rearrange"))
             .args(["run", ROOMS, "--name", "rooms", "--json"])
-            .args(["--delay", "robot-0=3"])
+            .args(["--delay", "robot-0=6"])
             .args(more)
             .env("XDG_RUNTIME_DIR", place)
             .stdout(Stdio::piped())
