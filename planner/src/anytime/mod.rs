@@ -308,7 +308,7 @@ impl Anytime {
                 if solver.units() < last && self.begin_round(solver, scene, snapshot) {
                     Stage::Round(solver.units() + units(ROUND_S), last)
                 } else {
-                    is_written = self.list_all(snapshot.robots(), out);
+                    is_written = self.list_all(snapshot, out);
                     Stage::Done(Verdict::Open)
                 }
             }
@@ -319,7 +319,7 @@ impl Anytime {
                 let is_exhausted = solver.units() < until;
                 let is_better = self.take_better(solver, scene, snapshot, out);
                 if is_exhausted && !is_better {
-                    is_written = self.list_all(snapshot.robots(), out);
+                    is_written = self.list_all(snapshot, out);
                     Stage::Done(Verdict::Open)
                 } else {
                     is_written = is_better || self.list_on(solver, snapshot, out);

@@ -8,11 +8,12 @@
 //! the present one can be over. All the rest can still change, so setting off costs next to nothing.
 
 use scene::Scene;
-use shm_types::{Checked, RobotState, Schedule, WorldSnapshot};
+use shm_types::{Checked, Schedule, WorldSnapshot};
 
 use crate::anytime::Anytime;
 use crate::anytime::ground::Time;
 use crate::anytime::keep::kept;
+use crate::anytime::publish::Script;
 use crate::anytime::solver::Solver;
 
 /// Share of the makespan for which better plans are looked for while robots follow the first one.
@@ -89,21 +90,31 @@ impl Anytime {
         out: &mut Schedule,
     ) -> bool {
         let until = self.next(solver, snapshot);
-        let Some(script) = self.script.as_mut().filter(|script| script.is_limited()) else {
-            return false;
-        };
-        script.limit(solver.followed(), until);
-        let robots = snapshot.robots();
-        script.write(|robot| robots[robot].actions, out);
-        true
+        self.list(snapshot, out, |script| {
+            script.limit(solver.followed(), until)
+        })
     }
 
     /// Lists all of the plan. Whether it did: it may be listed already.
-    pub(super) fn list_all(&mut self, robots: &[RobotState], out: &mut Schedule) -> bool {
+    pub(super) fn list_all(
+        &mut self,
+        snapshot: Checked<WorldSnapshot>,
+        out: &mut Schedule,
+    ) -> bool {
+        self.list(snapshot, out, Script::lift_limit)
+    }
+
+    fn list(
+        &mut self,
+        snapshot: Checked<WorldSnapshot>,
+        out: &mut Schedule,
+        more: impl FnOnce(&mut Script),
+    ) -> bool {
         let Some(script) = self.script.as_mut().filter(|script| script.is_limited()) else {
             return false;
         };
-        script.lift_limit();
+        more(script);
+        let robots = snapshot.robots();
         script.write(|robot| robots[robot].actions, out);
         true
     }
