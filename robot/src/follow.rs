@@ -9,7 +9,7 @@
 //! goes on where the one before it stopped.
 //!
 //! Terms: an action's grip is *due* from when the action is granted until the object is held or
-//! put down; nothing past it is asked for until then.
+//! put down; what comes after it is asked for no earlier than along with the grip.
 
 use scene::{ARRIVAL_M, Settings, vec};
 use shm_types::{
@@ -29,9 +29,9 @@ const ACTIONS_AHEAD: usize = 8;
 pub(crate) struct Follower {
     look_again_ns: u64,
     started: bool,
-    /// The action that the newest request ends with, and its number: a schedule that comes into
-    /// force after it was granted may not list it any more.
-    last: Option<(u32, Action)>,
+    /// The last actions granted and asked for, and their numbers: a schedule that comes into force
+    /// after they were granted may not list them any more.
+    last: [Option<(u32, Action)>; 2],
     /// When that was asked for.
     asked_ns: u64,
     /// Version of the scene; in another one what was asked for before is void.
@@ -53,7 +53,7 @@ impl Follower {
         Self {
             look_again_ns: settings.look_again_ns,
             started: false,
-            last: None,
+            last: [None; 2],
             asked_ns: 0,
             scene_version: 0,
         }
@@ -68,7 +68,7 @@ impl Follower {
         intent.waits_for = Wait::NONE;
         let version = now.snapshot.header.scene_version;
         if self.scene_version != version {
-            (self.scene_version, self.last) = (version, None);
+            (self.scene_version, self.last) = (version, [None; 2]);
         }
         let part = now.schedule.and_then(|schedule| schedule.part(now.id));
         let (Some(schedule), Some(part)) = (now.schedule, part) else {
@@ -79,7 +79,13 @@ impl Follower {
         let next = next_grasp(now, (schedule, part), due);
         intent.claim = select::claim(now, now.holding().or_else(|| may_claim(now, next)));
         match due {
-            Some(due) if now.me().grant_count == 0 => grip(now, due),
+            Some(due) if now.me().grant_count == 0 => {
+                let (phase, doing) = grip(now, due);
+                if doing.grip != Grip::Keep {
+                    self.ask_beyond(now, schedule, intent);
+                }
+                (phase, Doing { go: true, ..doing })
+            }
             Some(_) => (under_way(now, next, part), Doing::waiting(u64::MAX)),
             None => {
                 intent.waits_for = waits_for(now, schedule);
@@ -91,11 +97,7 @@ impl Follower {
 
     /// The grip that the last granted action ends with, if it is due.
     fn due(&self, now: &Now<'_>, schedule: &Schedule) -> Option<Due> {
-        let number = now.me().actions.checked_sub(1)?;
-        let remembered = self.last.as_ref().filter(|(last, _)| *last == number);
-        let action = schedule
-            .action(now.id, number)
-            .or(remembered.map(|(_, action)| action))?;
+        let action = self.action(now, schedule, now.me().actions.checked_sub(1)?)?;
         let due = Due {
             grip: Grip::decode(action.grip).ok()?,
             object: index(action.object)?,
@@ -107,6 +109,45 @@ impl Follower {
             Grip::Release => now.holding() == Some(due.object),
         };
         is_due.then_some(due)
+    }
+
+    /// An action that is listed, or that it remembers.
+    fn action(&self, now: &Now<'_>, schedule: &Schedule, number: u32) -> Option<Action> {
+        let mut remembered = self.last.iter().flatten();
+        let listed = schedule.action(now.id, number).copied();
+        listed.or_else(|| {
+            let (_, action) = remembered.find(|(last, _)| *last == number)?;
+            Some(*action)
+        })
+    }
+
+    /// Asks, along with a grip, for what comes after it, so that no tick is lost: the world takes it
+    /// up as soon as the grip is made. What goes nowhere is granted at once, and so not asked for.
+    fn ask_beyond(&mut self, now: &Now<'_>, schedule: &Schedule, intent: &mut Intent) {
+        let asked = intent.asked.request();
+        let is_new = |request: &PathRequest| {
+            let of = |request: &PathRequest| (request.actions, request.schedule_version);
+            request.count > 1 && of(request) != of(asked)
+        };
+        if let Some(request) = batch(now, schedule).filter(is_new) {
+            self.ask(now, schedule, intent, request);
+        }
+    }
+
+    fn ask(
+        &mut self,
+        now: &Now<'_>,
+        schedule: &Schedule,
+        intent: &mut Intent,
+        request: PathRequest,
+    ) {
+        let last = [now.me().actions, request.actions].map(|count| {
+            let number = count.checked_sub(1)?;
+            Some((number, self.action(now, schedule, number)?))
+        });
+        self.last = last;
+        self.asked_ns = now.time_ns();
+        intent.asked.ask_for(request, intent.sequence);
     }
 
     /// Asks for what comes next as soon as it may.
@@ -132,10 +173,7 @@ impl Follower {
         if (me.grant_count as usize) < ACTIONS_AHEAD
             && let Some(request) = batch(now, schedule)
         {
-            let last = request.actions - 1;
-            self.last = schedule.action(now.id, last).map(|action| (last, *action));
-            self.asked_ns = now.time_ns();
-            intent.asked.ask_for(request, intent.sequence);
+            self.ask(now, schedule, intent, request);
         }
         Doing::waiting(u64::MAX)
     }
@@ -144,7 +182,7 @@ impl Follower {
     pub(crate) fn hash_into(&self, hash: &mut StateHash) {
         hash.add(&[u64::from(self.started), self.asked_ns]);
         hash.add(&self.scene_version);
-        if let Some((number, action)) = &self.last {
+        for (number, action) in self.last.iter().flatten() {
             hash.add(number);
             hash.add(action);
         }

@@ -187,7 +187,12 @@ fn a_task_from_the_first_action_to_the_last() {
     );
     bench.drive();
     assert_eq!(bench.step(), (Phase::Grasping, Activity::Gripping));
-    assert_eq!((bench.grip(), bench.command.go), (Grip::Grasp, 0));
+    assert_eq!((bench.grip(), bench.command.go), (Grip::Grasp, 1));
+    assert_eq!(
+        bench.asked(),
+        (1, 3),
+        "along with the grip, what comes after"
+    );
     bench.hold(true);
     assert_eq!(bench.step(), (Phase::Transfer, Activity::Waiting));
     assert_eq!((bench.grip(), bench.asked()), (Grip::Keep, (1, 3)));
@@ -205,6 +210,39 @@ fn a_task_from_the_first_action_to_the_last() {
     bench.drive();
     assert_eq!(bench.step(), (Phase::Idle, Activity::Idle));
     assert_eq!(bench.command.settled_at_change, 7);
+}
+
+#[test]
+fn along_with_a_grip_nothing_is_asked_for_that_waits_or_goes_nowhere() {
+    let mut bench = Bench::new();
+    bench.schedule.as_deref_mut().unwrap().actions[3].to = GOAL;
+    for others in [0, 3] {
+        bench.snapshot.robots[1].actions = others;
+        bench.hold(true);
+        bench.stand(GOAL, 3);
+        bench.step();
+        assert_eq!(bench.grip(), Grip::Release);
+        assert_eq!(bench.asked(), (0, 0), "{others} actions of robot 1");
+        bench.hold(false);
+    }
+    bench.step();
+    assert_eq!(bench.asked(), (0, 4), "once the grip is made");
+}
+
+#[test]
+fn what_is_asked_for_along_with_a_grip_is_repeated_until_the_schedule_changes() {
+    let mut bench = Bench::new();
+    bench.stand(GRASP, 2);
+    bench.step();
+    let asked = bench.command.path;
+    bench.snapshot.robots[0].acknowledged = bench.command.sequence;
+    bench.step();
+    assert_eq!((bench.grip(), bench.asked()), (Grip::Grasp, (1, 3)));
+    assert_eq!(bench.command.path.id, asked.id);
+    bench.schedule.as_deref_mut().unwrap().version = 2;
+    bench.step();
+    let path = &bench.command.path;
+    assert_eq!((path.id, path.schedule_version), (asked.id + 1, 2));
 }
 
 #[test]

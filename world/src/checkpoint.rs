@@ -101,6 +101,7 @@ saved!(Robot {
     drive: 1.0,
     track: Track::still(position),
     granted_m: 0.0,
+    told: false,
     moved: false,
     gripped: false,
 });

@@ -15,7 +15,6 @@ impl World {
     /// Takes the new ones of the newest commands.
     pub(crate) fn take_commands(
         &mut self,
-        scene: &Scene,
         input: &WorldInput<'_>,
         known: Option<&ConstraintTable>,
         journal: &mut Journal<'_>,
@@ -32,11 +31,11 @@ impl World {
                 && command.robot as usize == i
                 && self.guards.holds(Guard::Incarnation, of_this)
                 && self.guards.holds(Guard::Sequence, newer);
+            self.robots[i].told = new;
             if new {
                 self.take_intent(i, command);
                 self.take_claim(i, command.claim, known, journal);
                 self.take_failure(i, command.failure);
-                self.take_request(scene, i, command);
             }
         }
         for robot in &self.robots {
@@ -63,14 +62,23 @@ impl World {
         link.activity = Activity::decode(command.activity).unwrap_or(Activity::Idle);
     }
 
-    fn take_request(&mut self, scene: &Scene, i: usize, command: &Command) {
+    /// Takes the path requests of the commands taken, once their grips have begun: what is asked
+    /// for in the same command comes after the grip.
+    pub(crate) fn take_requests(&mut self, scene: &Scene, input: &WorldInput<'_>) {
         let in_force = InForce {
             guards: self.guards,
             tick: self.tick,
             schedule_version: self.schedules.in_force,
         };
-        let robot = &mut self.robots[i];
-        let sound = requests::take(scene, &self.bodies, robot, &command.path, in_force);
-        self.counters.invalid_requests += u64::from(!sound);
+        let commands = input.commands.iter().zip(&mut self.robots);
+        for (command, robot) in commands {
+            let Some(command) = command.map(Checked::get) else {
+                continue;
+            };
+            if robot.told && !robot.awaits_grip() {
+                let sound = requests::take(scene, &self.bodies, robot, &command.path, in_force);
+                self.counters.invalid_requests += u64::from(!sound);
+            }
+        }
     }
 }

@@ -3,7 +3,8 @@
 //! Responsible for: when a grip may begin, how long it takes, when it ends. Not responsible for:
 //! what its end means to the task (`tasks.rs`).
 //!
-//! A grip begins only where the robot stands; it gives up what is granted ahead of it. From the
+//! A grip begins only where the robot stands; it gives up what is granted ahead of it. What is asked
+//! for in the same command comes after it, and is taken up as soon as the grip is made. From the
 //! first moment of closing the object counts as part of the robot, so that nobody is granted path
 //! under it. Grips take whole ticks, rounded up; one of no duration takes place at once.
 
@@ -176,9 +177,9 @@ impl World {
 #[cfg(test)]
 mod tests {
     use scene::Scene;
-    use shm_types::{Activity, ControlKind, EventKind, Grip, NONE, TaskStatus};
+    use shm_types::{Activity, ControlKind, EventKind, Grip, NONE, Point, TaskStatus};
 
-    use crate::testing::{BELOW, Bench, room};
+    use crate::testing::{BELOW, Bench, TICK_M, room};
 
     const FAR: [[f64; 2]; 2] = [[1.0, 1.45], [5.0, 5.0]];
 
@@ -275,6 +276,71 @@ mod tests {
         bench.steps(4);
         assert_eq!(bench.robot(0).holding, 0);
         assert_eq!((bench.robot(0).grant_count, bench.at(0)), (0, [1.0, 1.0]));
+    }
+
+    #[test]
+    fn what_is_asked_for_along_with_a_grip_begins_in_the_tick_in_which_it_is_made() {
+        let mut bench = ready(BELOW, "");
+        bench.grip(0, Grip::Grasp);
+        bench.ask(0, &[[2.0, 1.0]]);
+        bench.step();
+        assert_eq!(
+            (bench.robot(0).holding, bench.at(0)),
+            (0, [1.0 + TICK_M, 1.0])
+        );
+        assert_eq!(bench.robot(0).activity, Activity::Moving.code());
+        bench.grip(0, Grip::Keep);
+        bench.steps(200);
+        bench.grip(0, Grip::Release);
+        bench.ask(0, &[[2.0, 0.5]]);
+        bench.step();
+        assert_eq!(
+            (bench.robot(0).holding, bench.at(0)),
+            (NONE, [2.0, 1.0 - TICK_M])
+        );
+        assert_eq!(bench.object(0).position, Point::new(2.0, 1.45));
+    }
+
+    #[test]
+    fn what_is_asked_for_along_with_a_grip_waits_until_it_is_over() {
+        let mut bench = ready(BELOW, "grasp_s = 0.02");
+        bench.grip(0, Grip::Grasp);
+        bench.ask(0, &[[2.0, 1.0]]);
+        for _ in 0..2 {
+            bench.step();
+            assert_eq!((bench.robot(0).grant_count, bench.at(0)), (0, [1.0, 1.0]));
+        }
+        assert_eq!(bench.robot(0).holding, 0);
+        bench.step();
+        assert_eq!(bench.at(0), [1.0 + TICK_M, 1.0]);
+    }
+
+    #[test]
+    fn without_its_grip_nothing_that_comes_after_it_is_granted() {
+        let mut bench = ready(BELOW, "");
+        bench.commands[0].claim = shm_types::Claim::NONE;
+        bench.grip(0, Grip::Grasp);
+        bench.ask(0, &[[2.0, 1.0]]);
+        bench.steps(5);
+        assert_eq!((bench.robot(0).holding, bench.at(0)), (NONE, [1.0, 1.0]));
+        assert_eq!((bench.robot(0).request, bench.robot(0).grant_count), (0, 0));
+        bench.claim(0, 0);
+        bench.step();
+        assert_eq!(
+            (bench.robot(0).holding, bench.at(0)),
+            (0, [1.0 + TICK_M, 1.0])
+        );
+    }
+
+    #[test]
+    fn what_comes_after_a_grip_is_looked_at_with_what_is_held_then() {
+        // The robot alone may go up to the wall; what it carries juts out above it.
+        let mut bench = ready(BELOW, "");
+        bench.grip(0, Grip::Grasp);
+        bench.ask(0, &[[1.0, 5.75]]);
+        bench.step();
+        assert_eq!(bench.world.counters().invalid_requests, 1);
+        assert_eq!((bench.robot(0).holding, bench.at(0)), (0, [1.0, 1.0]));
     }
 
     /// An object that robots lift from below and may pass under, and two robots.

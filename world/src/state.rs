@@ -193,6 +193,8 @@ pub(crate) struct Robot {
     pub(crate) track: Track,
     /// Length of the grant just before the tick's motion, m.
     pub(crate) granted_m: f64,
+    /// A new command of it was taken in the tick.
+    pub(crate) told: bool,
     /// Its position changed in the tick.
     pub(crate) moved: bool,
     /// Its grip was moving in the tick.
@@ -226,6 +228,7 @@ impl Robot {
             epoch_free: true,
             track: Track::still(home),
             granted_m: 0.0,
+            told: false,
             moved: false,
             gripped: false,
             activity: Activity::Idle,
@@ -253,6 +256,14 @@ impl Robot {
     /// Claims nothing, holds nothing, grips nothing, takes part.
     pub(crate) const fn is_idle(&self) -> bool {
         self.link.live && matches!(self.hand, Hand::Empty) && self.claim.is_none()
+    }
+
+    /// Whether the grip it asks for is not made: nothing past it is granted.
+    pub(crate) const fn awaits_grip(&self) -> bool {
+        matches!(
+            (self.link.grip, self.hand),
+            (Grip::Grasp, Hand::Empty) | (Grip::Release, Hand::Holding { .. })
+        )
     }
 
     /// Actions of its schedule that are granted to it: each point asked for ends one.

@@ -166,10 +166,10 @@ impl World {
         }
         let scene = input.change.map_or(scene, |next| &next.scene);
         self.take_control(input.control, &mut journal);
-        self.take_commands(scene, &input, published, &mut journal);
+        self.take_commands(&input, published, &mut journal);
         self.adopt_constraints(published, &mut journal);
         self.count_failures(&mut journal);
-        self.act(scene, &mut journal);
+        self.act(scene, &input, &mut journal);
         self.lift_bars_of_parked();
         self.open_epoch(&mut journal);
         self.watch(scene, &mut journal);
@@ -189,6 +189,7 @@ impl World {
 
     fn begin_tick(&mut self) {
         for robot in &mut self.robots {
+            robot.told = false;
             robot.moved = false;
             robot.gripped = false;
             robot.track = Track::still(robot.position);
@@ -197,10 +198,13 @@ impl World {
     }
 
     /// Grips, grants and motion: all that takes world time.
-    fn act(&mut self, scene: &Scene, journal: &mut Journal<'_>) {
+    fn act(&mut self, scene: &Scene, input: &WorldInput<'_>, journal: &mut Journal<'_>) {
         let (start_ns, tick_ns) = (self.time_ns, self.settings.tick_ns);
         if !self.held {
             self.begin_grips(scene, journal);
+        }
+        self.take_requests(scene, input);
+        if !self.held {
             let around = Surroundings {
                 scene,
                 bodies: &self.bodies,

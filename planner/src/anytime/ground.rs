@@ -26,9 +26,9 @@ pub(crate) type Time = u32;
 /// After all.
 pub(crate) const EVER: Time = Time::MAX;
 
-/// Ticks that a grip takes beyond its own duration, from standing there to going on: the command,
-/// the snapshot that shows it held, the next request.
-const TICKS_PER_GRIP: f64 = 2.0;
+/// Ticks that a grip takes beyond its own duration at most: it begins with a tick, and robots stop
+/// within one.
+const TICKS_PER_GRIP: f64 = 1.0;
 
 /// An offset in lattice steps.
 pub(crate) type Offset = (i32, i32);
