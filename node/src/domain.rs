@@ -327,8 +327,8 @@ pub fn list() -> Result<Vec<ListedRun>, DomainError> {
     Ok(live.chain(dead).collect())
 }
 
-/// Writes a private file, renamed into place.
-fn put(path: &Path, bytes: &[u8]) -> Result<(), DomainError> {
+/// Writes a private file, renamed into place: whenever a process dies, it is whole.
+pub(crate) fn put(path: &Path, bytes: &[u8]) -> Result<(), DomainError> {
     let draft = path.with_extension("draft");
     let write = || {
         let mut file = OpenOptions::new()

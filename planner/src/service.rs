@@ -95,6 +95,8 @@ pub struct Planner {
     schedule: Option<Box<Schedule>>,
     /// Its version when it was published last; 0 if it never was.
     schedule_version: u32,
+    /// It is to be published as it is.
+    repeats: bool,
     /// What is published has versions past this one: a planner before may have published some
     /// that are not in force yet.
     versions_past: u32,
@@ -134,6 +136,7 @@ impl Planner {
             dropped: 0,
             schedule: settings.method.plans_ahead().then(zeroed),
             schedule_version: 0,
+            repeats: false,
             versions_past: 0,
             scene_version: 0,
             anytime: (settings.method.plans_ahead()).then(|| Anytime::new(&settings)),
@@ -144,14 +147,29 @@ impl Planner {
     }
 
     /// A planner in the place of one that is gone, as process `incarnation`, from 1. Nothing it
-    /// publishes has a version that one before it has used.
+    /// makes has a version that one before it has used. `published` is the newest schedule of those
+    /// before, if it is at hand: it is published once more, for robots that are started now.
     #[must_use]
-    pub fn succeeding(scene: &Scene, settings: Settings, incarnation: u32) -> Self {
+    pub fn succeeding(
+        scene: &Scene,
+        settings: Settings,
+        incarnation: u32,
+        published: Option<&Schedule>,
+    ) -> Self {
         let versions_past = incarnation.saturating_sub(1).min(MOST_PROCESSES) * VERSIONS;
-        Self {
+        let mut planner = Self {
             versions_past,
             ..Self::new(scene, settings)
+        };
+        if let (Some(own), Some(published)) = (&mut planner.schedule, published) {
+            own.copy_from(published);
+            planner.schedule_version = published.version;
+            planner.repeats = true;
+            if let Some(anytime) = &mut planner.anytime {
+                anytime.inherit(published);
+            }
         }
+        planner
     }
 
     /// A planner whose plan is made already: it publishes `schedule` in its first step, numbered
@@ -212,7 +230,8 @@ impl Planner {
         }
         let is_due = header.tick.is_multiple_of(TICKS_TO_REPEAT);
         let repeat_table = is_due && self.is_published;
-        let repeat_schedule = is_due && self.schedule_version > 0;
+        let repeat_schedule = is_due && self.schedule_version > 0 || self.repeats;
+        self.repeats = false;
         self.is_published |= publish;
         PlannerOutput {
             report: self.report(input.snapshot),
@@ -242,9 +261,9 @@ impl Planner {
         let in_force = header.schedule_version;
         let is_due = match &mut self.anytime {
             None => self.standing == Standing::Written && in_force == 0,
-            // One that was started again knows nothing of what robots follow, and leaves them to it.
-            Some(anytime) if self.schedule_version == 0 && in_force > 0 => {
-                anytime.inherit();
+            // One that was started again does not know what robots follow.
+            Some(anytime) if self.schedule_version < in_force => {
+                anytime.replan(snapshot);
                 let counters = &mut self.counters;
                 self.standing = anytime.advance(scene, snapshot, budget, counters, schedule);
                 self.standing == Standing::Written
@@ -287,6 +306,7 @@ impl Planner {
             table: std::mem::replace(&mut self.table, zeroed()),
             schedule: self.schedule.take(),
             schedule_version: self.schedule_version,
+            repeats: self.repeats,
             versions_past: self.versions_past,
             scene_version: snapshot.header.scene_version,
             tick: self.tick,

@@ -186,10 +186,17 @@ impl<'s> Simulation<'s> {
         self.tell(ControlKind::Down, RoleKind::Robot, id, incarnation);
     }
 
-    /// Puts another planner in the place of the one there is. It knows only what the snapshots
-    /// say.
+    /// Puts another planner in the place of the one there is. It knows what the snapshots say, and
+    /// the newest schedule.
     pub fn restart_planner(&mut self) {
-        self.planner = Planner::new(&self.scene, self.settings.clone());
+        self.report.incarnation += 1;
+        let published = self.schedules.newest().and_then(|(_, legal)| legal);
+        self.planner = Planner::succeeding(
+            &self.scene,
+            self.settings.clone(),
+            self.report.incarnation,
+            published.map(Checked::get),
+        );
     }
 
     /// Changes the scene, all of `changes` together: the tick whose snapshot is the first to show
@@ -331,7 +338,7 @@ impl<'s> Simulation<'s> {
         };
         let output = self.planner.step(&self.scene, input, units);
         self.report = PlannerReport {
-            incarnation: FIRST_INCARNATION,
+            incarnation: self.report.incarnation,
             ..output.report
         };
         for answer in output.answers {

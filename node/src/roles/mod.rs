@@ -37,6 +37,8 @@ use crate::wakes::{Sleeper, Waker};
 
 /// The world's journal, in the run's directory.
 pub(crate) const JOURNAL_FILE: &str = "journal";
+/// The newest schedule, likewise.
+const SCHEDULE_FILE: &str = "schedule";
 /// The trace, in the run's directory, where no other place was asked for.
 pub(crate) const TRACE_FILE: &str = "trace.mcap";
 
@@ -214,6 +216,11 @@ impl Seat {
     /// Where the world keeps its journal.
     pub(crate) fn journal_path(&self) -> PathBuf {
         self.directory.join(JOURNAL_FILE)
+    }
+
+    /// Where the planner keeps its newest schedule.
+    pub(crate) fn schedule_path(&self) -> PathBuf {
+        self.directory.join(SCHEDULE_FILE)
     }
 
     /// Where the recorder writes: the place asked for, or one in the run's directory.

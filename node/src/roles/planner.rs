@@ -4,7 +4,11 @@
 //! every driver keeps, and carrying off tables, answers and its report.
 //! Not responsible for: anything the planner decides (crate `planner`).
 //!
-//! What a step publishes is sent before its report: whoever has the report has the rest.
+//! What a step publishes is sent before its report: whoever has the report has the rest. A schedule
+//! is written down before it is sent, for the next process of the planner: robots go on with it when
+//! this one dies.
+
+mod last;
 
 use std::path::Path;
 
@@ -22,6 +26,7 @@ use crate::ports::{Access, Publisher};
 use crate::roles::follower::{Follower, Next};
 use crate::roles::{RoleError, Seat, Telling, refused};
 use crate::wakes::Waker;
+use last::LastSchedule;
 
 /// Takes part in the run in `run_dir`, as process `incarnation` of the planner, until it ends.
 ///
@@ -69,6 +74,7 @@ struct Shell {
     requests: Vec<HardRequest>,
     tables: Publisher<ConstraintTable>,
     schedules: Option<Publisher<Schedule>>,
+    last: LastSchedule,
     outlet: Publisher<PlannerReport>,
     waker: Option<Waker>,
     counters: Counters,
@@ -81,12 +87,15 @@ impl Shell {
         let (topics, node) = (&seat.topics, &seat.node);
         let schedules = topics.schedule_service(node, Access::Open)?;
         let most = seat.run.room().robots as usize * (OPEN_CALLS + 1);
+        let last = LastSchedule::new(seat.schedule_path());
         Ok(Self {
             planner: Planner::succeeding(
                 &seat.scene,
                 seat.options().settings.clone(),
                 seat.incarnation,
+                last.read(seat.counts()).as_deref(),
             ),
+            last,
             server: topics.hard.service(node, Access::Open)?.server()?,
             questions: Vec::with_capacity(most),
             requests: Vec::with_capacity(most),
@@ -124,6 +133,7 @@ impl Shell {
             self.tables.send(|out| out.copy_from(table))?;
         }
         if let (Some(schedules), Some(schedule)) = (&self.schedules, output.schedule) {
+            self.last.write(schedule)?;
             schedules.send(|out| out.copy_from(schedule))?;
         }
         for answer in output.answers {

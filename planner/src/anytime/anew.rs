@@ -40,12 +40,16 @@ impl Anytime {
         };
     }
 
-    /// An earlier process made the plan that robots follow, which this one knows nothing of: it
-    /// leaves them to it, and plans anew once they stand still.
-    pub(crate) fn inherit(&mut self) {
-        if self.stage == Stage::New && self.script.is_none() {
-            self.stage = Stage::Inherited;
-        }
+    /// Robots follow what an earlier process has published. If that is all of its plan they are left
+    /// to it; else nobody knows what comes after.
+    pub(crate) fn inherit(&mut self, published: &Schedule) {
+        let robots = &published.robots[..published.robot_count as usize];
+        let is_all = robots.iter().all(|part| part.complete == 1);
+        self.stage = if is_all {
+            Stage::Inherited
+        } else {
+            Stage::Stop
+        };
     }
 
     /// Whether other robots take part than did when this was asked last.

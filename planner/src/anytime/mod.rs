@@ -61,7 +61,7 @@ const UNITS_PER_INTERVAL: u64 = 7;
 /// What comes next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
-    /// Robots follow a plan that an earlier process of the planner made.
+    /// Robots follow a plan that an earlier process of the planner made, all of which they know.
     Inherited,
     /// Robots are to go no further than is granted to them, since something has changed.
     Stop,

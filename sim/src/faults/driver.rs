@@ -207,9 +207,14 @@ impl<'s> Disturbed<'s> {
     /// Starts again whoever is due, and tells the world until it shows.
     fn supervise(&mut self, now: u64) {
         if self.office.planner.is_none() && now >= self.office.back_at {
-            let planner = Planner::new(self.scene, self.settings.clone());
-            self.office.planner = Some(Box::new(planner));
             self.office.incarnation += 1;
+            let planner = Planner::succeeding(
+                self.scene,
+                self.settings.clone(),
+                self.office.incarnation,
+                self.office.published.as_ref().map(|schedule| &***schedule),
+            );
+            self.office.planner = Some(Box::new(planner));
         }
         for id in 0..self.stations.len() {
             let station = &mut self.stations[id];

@@ -36,6 +36,8 @@ pub(crate) struct Office {
     pub(crate) schedules: Inbox<Schedule>,
     pub(crate) table_history: VecDeque<Shared<ConstraintTable>>,
     pub(crate) schedule_history: VecDeque<Shared<Schedule>>,
+    /// The newest schedule, as a planner process writes it down for the next one.
+    pub(crate) published: Option<Shared<Schedule>>,
 }
 
 impl Office {
@@ -53,6 +55,7 @@ impl Office {
             schedules: Inbox::new(),
             table_history: VecDeque::new(),
             schedule_history: VecDeque::new(),
+            published: None,
         }
     }
 
@@ -130,6 +133,7 @@ impl Disturbed<'_> {
         }
         if let Some(schedule) = output.schedule {
             let schedule = copy(schedule);
+            office.published = Some(Rc::clone(&schedule));
             for (id, station) in self.stations.iter_mut().enumerate() {
                 let fate = self.faults.fate(Channel::Schedule, Whom::Robot(id));
                 let message = Rc::clone(&schedule);
