@@ -56,6 +56,23 @@ fn a_planner_that_is_started_again_goes_on_from_where_everything_is() {
     }
 }
 
+/// Once all of the plan is listed nothing is lost with the planner, not even for a robot that is
+/// started after it.
+#[test]
+fn a_planner_that_is_started_again_leaves_robots_to_a_plan_that_is_listed_to_its_end() {
+    for seed in 0..6 {
+        let room = random_room(seed);
+        let undisturbed = run_disturbed(&room, &[], |_, _| {});
+        let late = undisturbed.ticks / 2;
+        let report = run_disturbed(&room, &[late, late + 1], |run, turn| match turn {
+            0 => run.restart_planner(),
+            _ => run.restart_robot(0),
+        });
+        assert_eq!(report.outcome, Outcome::Solved, "{seed}");
+        assert_eq!(report.ticks, undisturbed.ticks, "{seed}");
+    }
+}
+
 /// A robot is lost, and comes back before the others find out that they cannot do without it: what
 /// it held and where it stood is taken into account.
 #[test]

@@ -4,8 +4,8 @@ use planner::{Planner, PlannerInput};
 use scene::{Draft, HardMode, Method, ObjectDraft, Scene, Settings, ShapeDraft, WallDraft};
 use shm_types::capacity::MAX_CONSTRAINTS;
 use shm_types::{
-    Constraint, ConstraintKind, ConstraintTable, HardAnswer, HardRequest, PlannerReport,
-    WorldSnapshot, zeroed,
+    Activity, Constraint, ConstraintKind, ConstraintTable, HardAnswer, HardRequest, PlannerReport,
+    Schedule, WorldSnapshot, zeroed,
 };
 
 use crate::room::{checked, put, scene_of, shipped, start};
@@ -375,4 +375,71 @@ fn a_table_that_is_full_says_how_much_is_missing() {
         pairs - MAX_CONSTRAINTS
     );
     assert!(service.table.constraints().is_sorted());
+}
+
+/// Version and number of actions of what a planner publishes in its first step and in the next
+/// hundred, where this is in force.
+fn published_after(last: Option<&Schedule>, in_force: u32) -> (Option<(u32, u32)>, usize) {
+    let scene = shipped("paper-68a");
+    let settings = Settings {
+        method: Method::Anytime,
+        ..Settings::default()
+    };
+    let mut world = start(&scene);
+    world.header.schedule_version = in_force;
+    for robot in &mut world.robots[..4] {
+        robot.activity = Activity::Idle.code();
+    }
+    let mut planner = Planner::succeeding(&scene, settings, 2, last);
+    let mut step = |world: &WorldSnapshot| {
+        let input = PlannerInput {
+            snapshot: checked(&scene, world),
+            requests: &[],
+        };
+        let output = planner.step(&scene, input, MUCH);
+        let told = |schedule: &Schedule| (schedule.version, schedule.action_count);
+        output.schedule.map(told)
+    };
+    let first = step(&world);
+    let mut more = 0;
+    for tick in 1..100 {
+        world.header.tick = tick;
+        (world.header.schedule_version, _) = first.unwrap_or((in_force, 0));
+        more += usize::from(step(&world).is_some());
+    }
+    (first, more)
+}
+
+/// A schedule that lists one action of robot 0.
+fn schedule_of_one_action(version: u32, complete: u32) -> Box<Schedule> {
+    let mut schedule: Box<Schedule> = zeroed();
+    (schedule.version, schedule.robot_count) = (version, 4);
+    schedule.action_count = 1;
+    for part in &mut schedule.robots[..4] {
+        part.complete = 1;
+    }
+    (schedule.robots[0].count, schedule.robots[0].complete) = (1, complete);
+    schedule
+}
+
+#[test]
+fn the_next_planner_publishes_a_whole_plan_once_more_and_leaves_robots_to_it() {
+    let last = schedule_of_one_action(7, 1);
+    assert_eq!(published_after(Some(&last), 7), (Some((7, 1)), 0));
+    assert_eq!(
+        published_after(Some(&last), 0).0,
+        Some((7, 1)),
+        "also if the world had not got it"
+    );
+}
+
+#[test]
+fn the_next_planner_stops_robots_and_plans_anew_where_it_does_not_know_all_of_the_plan() {
+    let part = schedule_of_one_action(7, 0);
+    for last in [Some(&*part), None] {
+        let (first, more) = published_after(last, 7);
+        let (version, actions) = first.unwrap();
+        assert!(version > 7 && actions == 0, "{version}, {actions} actions");
+        assert!(more > 0, "and then plans");
+    }
 }
