@@ -54,10 +54,12 @@ impl World {
     }
 
     /// Whether robot `i` with `object` in its grip would stand clear of walls, other objects, and
-    /// every other robot's body and granted path.
+    /// every other robot's body and granted path. Who passes under an object keeps no clearance
+    /// from it, and has to once it is held.
     fn may_carry(&self, scene: &Scene, i: usize, object: usize, class: ClassId) -> bool {
         let robot = &self.robots[i];
         let stand = Sweep::standing(class, robot.position);
+        let clearance = scene.objects[object].pass_under;
         let meets_object = |region: Aabb| {
             let met = self.bodies.ground.find_near(region, |other, at| {
                 let shape = &scene.objects[other].shape;
@@ -74,11 +76,11 @@ impl World {
                 let mut from = other.position;
                 let here = Sweep::standing(class, from);
                 let mut ahead = other.grant.points().iter();
-                self.bodies.sweeps_meet(scene, stand, false, here)
+                self.bodies.sweeps_meet(scene, stand, clearance, here)
                     || ahead.any(|&to| {
                         let piece = Sweep { class, from, to };
                         from = to;
-                        self.bodies.sweeps_meet(scene, stand, false, piece)
+                        self.bodies.sweeps_meet(scene, stand, clearance, piece)
                     })
             }
         };
@@ -344,18 +346,34 @@ mod tests {
     }
 
     /// An object that robots lift from below and may pass under, and two robots.
-    fn canopy() -> Scene {
+    fn canopy(clearance: f64) -> Scene {
         let text = "name = \"canopy\"\n[robot]\nshape = { box = [0.5, 0.5] }\nspeed = 0.5\n\
-            [object]\nshape = { box = [0.8, 0.8] }\ngrasp = [0.0, 0.0]\npass_under = true\n\
+            clearance = CLEARANCE\n[object]\nshape = { box = [0.8, 0.8] }\ngrasp = [0.0, 0.0]\npass_under = true\n\
             [workspace]\nbounds = [0.0, 0.0, 10.0, 6.0]\n\
             [[robots]]\nhome = [1.0, 1.0]\n[[robots]]\nhome = [5.0, 1.0]\n\
             [[objects]]\nstart = [3.0, 1.0]\ngoal = [3.0, 4.0]\n";
-        scene::parse(text, "canopy.toml").unwrap()
+        let text = text.replace("CLEARANCE", &clearance.to_string());
+        scene::parse(&text, "canopy.toml").unwrap()
+    }
+
+    #[test]
+    fn nothing_is_lifted_nearer_to_somebody_than_the_clearance() {
+        let mut bench = Bench::new(canopy(0.05));
+        bench.claim(0, 0);
+        bench.drive(0, &[[3.0, 1.0]]);
+        // 2 cm beside the object, as who passes under it may be, and 5 cm away.
+        for (x, holding) in [(3.67, NONE), (3.7, 0)] {
+            bench.grip(0, Grip::Keep);
+            bench.drive(1, &[[x, 1.0]]);
+            bench.grip(0, Grip::Grasp);
+            bench.step();
+            assert_eq!(bench.robot(0).holding, holding, "robot 1 at {x}");
+        }
     }
 
     #[test]
     fn nothing_is_lifted_over_somebody_else() {
-        let mut bench = Bench::new(canopy());
+        let mut bench = Bench::new(canopy(0.0));
         bench.claim(0, 0);
         bench.drive(0, &[[3.0, 1.0]]);
         bench.drive(1, &[[3.5, 1.0]]);
@@ -373,7 +391,7 @@ mod tests {
     #[test]
     fn the_robot_under_what_it_has_put_down_may_leave() {
         for pass_under in [true, false] {
-            let mut scene = canopy();
+            let mut scene = canopy(0.0);
             scene.objects[0].pass_under = pass_under;
             let mut bench = Bench::new(scene);
             bench.claim(0, 0);

@@ -84,18 +84,18 @@ pub(crate) fn vary(
             .filter(|&place| of_object(&order[place]))
             .nth(turn)?;
         shorter.remove(item);
-        return Some((Hops::new(scene, ground, start, homes, &sequence), shorter));
+        return Some((Hops::new(scene, ground, start, homes, &sequence)?, shorter));
     }
     let place = place_for(scene, ground, &rests, hops, &ways, blame, random)?;
     if end > first + 1 && random.random_range(0..2) == 0 {
         // Another place.
         sequence[random.random_range(first..end - 1)].1 = place;
-        let hops = Hops::new(scene, ground, start, homes, &sequence);
+        let hops = Hops::new(scene, ground, start, homes, &sequence)?;
         return Some((hops, order.to_vec()));
     }
     let number = if end == first { sequence.len() } else { first };
     sequence.insert(number, (object, place));
-    let longer = Hops::new(scene, ground, start, homes, &sequence);
+    let longer = Hops::new(scene, ground, start, homes, &sequence)?;
     let mut best: Option<(Time, Vec<Item>)> = None;
     for _ in 0..ORDERS_LOOKED_AT {
         let mut tried = order.to_vec();
@@ -201,9 +201,12 @@ fn place_for(
 ) -> Option<Rc<Place>> {
     let object = blame.object;
     let (first, end) = hops.of[object];
-    let by = hops.list[first..end].first().map_or(0, |hop| hop.to.by);
+    let by = match hops.list[first..end].first() {
+        Some(hop) => hop.to.by,
+        None => rests[object].place.open_by()?,
+    };
     let class = ground.carrying(object, by);
-    let near = ground.field(scene, class, rests[object].place.grasp);
+    let near = ground.field(scene, class, rests[object].place.held(by).grasp);
     let far = if first < end {
         ground.field(scene, class, hops.list[end - 1].to.grasp)
     } else {
@@ -252,7 +255,7 @@ fn place_for(
     };
     (points.iter())
         .map(|&(_, cell)| {
-            let at = scene.lattice.at(cell) - scene.objects[object].grasp;
+            let at = scene.lattice.at(cell) - scene.objects[object].grasps[by as usize].offset;
             Place::of(scene, ground, object, at).held(by)
         })
         .filter(|place| place.grasp != NOWHERE && stands(place))
@@ -266,7 +269,8 @@ mod tests {
     use scene::GenerateOptions;
 
     use super::*;
-    use crate::anytime::solver::{Solver, testing::planned};
+    use crate::anytime::solver::Solver;
+    use crate::anytime::solver::testing::{planned, planned_for};
 
     #[test]
     fn what_is_varied_still_leads_every_object_from_its_start_to_its_goal() {
@@ -308,5 +312,60 @@ mod tests {
             }
         }
         assert!(is_longer, "something was set aside");
+    }
+
+    /// Objects that can be held from below and from above, and stand so near a wall, at their start or
+    /// at their goal, that nobody has room on one side.
+    const AT_WALLS: &str = r#"
+        name = "at-walls"
+        [robot]
+        shape = { box = [0.5, 0.5] }
+        speed = 0.5
+        [object]
+        shape = { box = [0.4, 0.4] }
+        grasps = [[0.0, -0.45], [0.0, 0.45]]
+        [workspace]
+        bounds = [0.0, 0.0, 5.0, 2.4]
+        [[robots]]
+        home = [0.5, 1.2]
+        [[robots]]
+        home = [4.5, 1.2]
+        [[objects]]
+        start = [1.5, 0.3]
+        goal = [3.6, 2.1]
+        [[objects]]
+        start = [2.5, 0.3]
+        [[objects]]
+        start = [3.4, 0.4]
+        goal = [1.6, 1.4]
+    "#;
+
+    #[test]
+    fn an_object_is_set_aside_as_it_can_be_held_and_goes_on_so() {
+        let scene = scene::parse(AT_WALLS, "at-walls").unwrap();
+        let (mut solver, _) = planned_for(&scene);
+        let (mut hops, mut order) = solver.current.clone().unwrap();
+        let mut is_clutter_moved = false;
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        for _ in 0..200 {
+            let Solver {
+                ground,
+                start,
+                homes,
+                ..
+            } = &mut solver;
+            let varied = vary(&scene, ground, start, homes, (&hops, &order), &mut random);
+            let Some((found, items)) = varied else {
+                continue;
+            };
+            for hop in &found.list {
+                assert_ne!(hop.from.grasp, NOWHERE, "object {} there", hop.object);
+                assert_ne!(hop.to.grasp, NOWHERE, "object {} then", hop.object);
+                assert_eq!(hop.from.by, hop.to.by, "held in one way");
+            }
+            is_clutter_moved |= found.of[1].0 < found.of[1].1;
+            (hops, order) = (Rc::new(found), items);
+        }
+        assert!(is_clutter_moved);
     }
 }

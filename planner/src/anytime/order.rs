@@ -17,6 +17,7 @@ use shm_types::capacity::MAX_ROBOTS;
 use crate::anytime::ground::{EVER, Ground, Time};
 use crate::anytime::sequence::Step;
 use crate::anytime::track::{Place, Rest, Start};
+use crate::frontier::NOWHERE;
 
 /// An item of an order: an object, and the robot that moves it. An object that is moved several
 /// times goes through its places in turn.
@@ -51,14 +52,15 @@ pub(crate) struct Hops {
 }
 
 impl Hops {
-    /// The moves of a sequence.
+    /// The moves of a sequence; none if no robot has room to hold some object as it is to be moved,
+    /// before or after.
     pub(crate) fn new(
         scene: &Scene,
         ground: &mut Ground,
         start: &Start,
         homes: &[u32],
         sequence: &[Step],
-    ) -> Self {
+    ) -> Option<Self> {
         let mut list = Vec::new();
         let mut of = Vec::new();
         let rests = start.rests();
@@ -74,6 +76,10 @@ impl Hops {
                 from = Rc::clone(to);
             }
             of.push((first, list.len()));
+        }
+        let can_hold = |hop: &Hop| hop.from.grasp != NOWHERE && hop.to.grasp != NOWHERE;
+        if !list.iter().all(can_hold) {
+            return None;
         }
         let alone = ROBOT_ALONE.0;
         let read = |field: &[u32], cell: u32| field[cell as usize].checked_sub(1).unwrap_or(EVER);
@@ -126,7 +132,7 @@ impl Hops {
                 before[then].push(first);
             }
         }
-        Self {
+        Some(Self {
             list,
             of,
             free,
@@ -135,7 +141,7 @@ impl Hops {
             transfer,
             back,
             before,
-        }
+        })
     }
 
     /// Whether an object is moved more than once.

@@ -251,7 +251,7 @@ impl Solver {
 
     /// A first plan out of a sequence.
     fn begin_with(&mut self, scene: &Scene, sequence: &[Step]) -> Option<Time> {
-        let hops = Hops::new(scene, &mut self.ground, &self.start, &self.homes, sequence);
+        let hops = Hops::new(scene, &mut self.ground, &self.start, &self.homes, sequence)?;
         let objects: Vec<u32> = sequence.iter().map(|(object, _)| *object as u32).collect();
         let mut found = None;
         for mode in MODES {

@@ -120,7 +120,7 @@ pub(crate) struct GripAt<'a> {
 impl Place {
     /// Whether a robot can stand where it is grasped, by one grasp at least.
     pub(crate) fn is_open(&self) -> bool {
-        self.open_grasps().next().is_some()
+        self.open_by().is_some()
     }
 
     /// Whether a robot without an object that is at this cell is in its room.
@@ -131,6 +131,12 @@ impl Place {
     /// Where robots can stand that grasp it.
     pub(crate) fn open_grasps(&self) -> impl Iterator<Item = u32> + '_ {
         self.grasps.iter().copied().filter(|&cell| cell != NOWHERE)
+    }
+
+    /// The first grasp by which a robot can hold it there, if any.
+    pub(crate) fn open_by(&self) -> Option<u8> {
+        let open = self.grasps.iter().position(|&cell| cell != NOWHERE)?;
+        u8::try_from(open).ok()
     }
 
     /// The same place, where it is held by this grasp.

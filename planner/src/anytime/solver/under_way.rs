@@ -57,7 +57,9 @@ impl Solver {
         }
         self.known.clear();
         let (start, homes) = (&self.start, &self.homes);
-        let hops = Hops::new(scene, &mut self.ground, start, homes, &sequence);
+        let Some(hops) = Hops::new(scene, &mut self.ground, start, homes, &sequence) else {
+            return false;
+        };
         self.current = Some((Rc::new(hops), order));
         self.tried.clear();
         self.misses = 0;
