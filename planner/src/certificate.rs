@@ -48,8 +48,6 @@ fn graph(scene: &Scene, kind: CycleKind) -> PriorityGraph {
     let places: Vec<_> = (scene.objects.iter())
         .map(|object| match (kind, object.goal) {
             (CycleKind::Goals, None) => None,
-            // Another one may stand there in the end, or none.
-            (CycleKind::Goals, _) if object.kind.is_some() => None,
             (_, goal) => Some(Places {
                 initial: object.start,
                 goal: goal.unwrap_or(object.start),

@@ -120,3 +120,33 @@ fn for_each(near: &Near, low: Vec2, high: Vec2, margin_m: f64, mut visit: impl F
         false
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scene::{Draft, ObjectDraft};
+
+    #[test]
+    fn what_comes_within_the_margin_is_found() {
+        let mut draft = Draft::room("test", [0.0, 0.0, 5.0, 5.0]);
+        draft.homes = vec![[0.5, 0.5]];
+        // Robots are 0.5 m wide, objects 0.4 m, and grasped from 0.45 m below.
+        draft.objects = vec![ObjectDraft::paper([1.0, 2.5], Some([4.0, 4.0]))];
+        let scene = Scene::new(draft).unwrap();
+        let mut nearby = Nearby::new(&scene);
+        nearby.set(&scene, 0, Places::at_start(&scene).next().flatten());
+        let found = |margin_m| {
+            let mut found = Vec::new();
+            // 5 cm below the robot that grasps it.
+            let at = Vec2::new(1.0, 2.5 - 0.45 - 0.25 - 0.05 - 0.2);
+            nearby.for_each_grasped_near(at, margin_m, |end| found.push(end));
+            found
+        };
+        let initial = AtPlace {
+            task: 0,
+            goal: false,
+        };
+        assert_eq!(found(0.06), [initial]);
+        assert_eq!(found(0.04), []);
+    }
+}

@@ -8,6 +8,9 @@
 //! Terms: a *mask* is the set of offsets, in lattice steps, at which a body of one class overlaps
 //! one of another. Times are whole units of [`STRAIGHT`] a straight step.
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::HashMap;
 use std::sync::Arc;
 

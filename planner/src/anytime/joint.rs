@@ -11,6 +11,9 @@
 //!
 //! Terms: an object's cell is that of a robot which grasps it there.
 
+#[cfg(test)]
+mod tests;
+
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 use std::rc::Rc;

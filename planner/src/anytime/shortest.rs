@@ -12,6 +12,9 @@
 //! one another closely.
 //! Source: rule 34.
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::rc::Rc;

@@ -8,6 +8,9 @@
 //! be there (Phillips and Likhachev, "SIPP: Safe interval path planning for dynamic environments",
 //! ICRA 2011). Its ends belong to it: touching is not overlap, in time neither.
 
+#[cfg(test)]
+mod tests;
+
 use crate::anytime::ground::{EVER, Ground, Offset, Time};
 
 /// A robot's number, or that of an object after those of the robots.

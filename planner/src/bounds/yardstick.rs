@@ -413,6 +413,30 @@ mod tests {
     }
 
     #[test]
+    fn routes_are_sums_of_their_legs() {
+        let model = Model::new(&line(), (0.0, 0.0), []).unwrap();
+        let routes = Routes::new(&model);
+        let (first, second, both) = (0b01, 0b10, 0b11);
+        // From 0 to 1 and back; to 2, to 3 and back; one after the other.
+        assert_eq!(routes.whole_s(0, first), 2.0);
+        assert_eq!(routes.whole_s(0, second), 6.0);
+        assert_eq!(routes.whole_s(0, both), 6.0);
+        // From 1 to 2, to 3 and back.
+        assert_eq!(routes.rest_s(0, 0, second), 5.0);
+        assert_eq!(routes.shared_s(0, both), 2.0);
+    }
+
+    #[test]
+    fn a_small_room_is_searched_as_a_large_one_is() {
+        let at = |x: f64| Vec2::new(x / 64.0, 0.0);
+        let tasks = [(at(0.0), at(1.0)), (at(2.0), at(3.0))];
+        let legs = Legs::in_the_open(&[at(0.0), at(3.0)], &tasks);
+        let yardstick = Yardstick::of(&legs, (0.0, 0.0), [], PLENTY).unwrap();
+        // As on the line, where it is 2.
+        assert_eq!(yardstick.exact_s(), Some(2.0 / 64.0));
+    }
+
+    #[test]
     fn a_swap_takes_two_robots_that_hold() {
         use Event::{Finish, Grasp};
         let orders = [order(Grasp(0), Finish(1)), order(Grasp(1), Finish(0))];

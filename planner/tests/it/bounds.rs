@@ -86,3 +86,30 @@ fn where_there_is_nothing_to_bound_there_are_none() {
         );
     }
 }
+
+/// From each home, and from each grasp to what follows: three floods for each way of holding.
+#[test]
+fn where_objects_can_be_held_in_several_ways_each_of_them_is_paid_for() {
+    let trips = [
+        ([1.0, 1.5], Some([3.0, 1.5])),
+        ([1.0, 3.0], Some([3.0, 3.0])),
+    ];
+    let mut draft = draft([0.0, 0.0, 4.0, 4.0], &[], &[[2.0, 0.5]], &trips);
+    for object in &mut draft.objects {
+        object.other_grasps = vec![[0.45, 0.0]];
+    }
+    let scene = scene_of(draft);
+    let limited = |floods: usize| {
+        let points = floods * scene.lattice.len();
+        Bounds::of(
+            &scene,
+            BoundLimits {
+                points,
+                ..BoundLimits::default()
+            },
+        )
+    };
+    let floods = 1 + 3 * (2 + 2);
+    assert!(limited(floods).is_some());
+    assert_eq!(limited(floods - 1), None);
+}

@@ -86,3 +86,21 @@ fn clutter_in_a_ring_counts() {
         ring(CycleKind::Starts, &[0, 1])
     );
 }
+
+/// Two kinds, one of each object of the ring: every goal is filled already, by another one of its
+/// kind, which is to go to where that one stands.
+#[test]
+fn what_may_be_exchanged_proves_nothing() {
+    let mut draft = shipped("infeasible-e4-cycle").draft().clone();
+    let mates: Vec<_> = (draft.objects.iter_mut().zip(["one", "other"]))
+        .map(|(object, kind)| {
+            object.kind = Some(kind.to_owned());
+            let mut mate = object.clone();
+            mate.start = object.goal.unwrap();
+            mate.goal = Some(object.start);
+            mate
+        })
+        .collect();
+    draft.objects.extend(mates);
+    assert_eq!(certificate(&scene_of(draft)), None);
+}

@@ -87,6 +87,10 @@ fn four_tests_a_pair_are_charged_every_time() {
     assert_eq!(counters.polygon_tests, 4 * 3 * 2);
     assert_eq!(again, first);
     assert!(counters.units >= 20, "{counters:?}");
+    assert!(
+        (1..=24).contains(&easy.tested()),
+        "no more than were charged"
+    );
 
     // An object that has moved is looked at again, and a finished task is no node.
     let away = scene::point(scene::Vec2::new(3.0, 1.5));

@@ -87,3 +87,26 @@ fn walls_are_no_objects_goals_can_be_given_up() {
     let repair = Repair::of(&scene, PLENTY).unwrap();
     assert_eq!((repair.take_away, repair.deliver), (vec![0], vec![1]));
 }
+
+/// What the user says of objects is about the same ones when those before them are gone.
+#[test]
+fn the_users_lines_are_kept_when_other_objects_are_taken_away() {
+    let trips = [
+        ([1.0, 1.5], Some([4.0, 1.0])),
+        ([1.0, 2.0], Some([4.0, 2.0])),
+        ([2.5, 2.5], Some([4.0, 3.0])),
+    ];
+    let mut draft = crate::room::draft([0.0, 0.0, 5.0, 3.4], &[], &[[0.4, 0.4]], &trips);
+    // Object 0 stands where a robot has to stand that grasps object 1.
+    draft.before = [0, 2]
+        .map(|then| scene::UserOrder {
+            first: (1, scene::Event::Finish),
+            then: (then, scene::Event::Grasp),
+        })
+        .to_vec();
+    let scene = scene_of(draft);
+    assert!(matches!(proof(&scene), Some(Proof::Ring(_))));
+    // Without object 0 there is still a line about the other two, and no ring.
+    let repair = Repair::of(&scene, PLENTY).unwrap();
+    assert_eq!(repair.take_away, [0]);
+}

@@ -139,3 +139,17 @@ fn a_wall_across_the_room_leaves_some_legs_only() {
     assert!(legs.turn_s(1, 0).is_some() && legs.turn_s(0, 1).is_none());
     assert_eq!(legs.least_approach_s(1), None);
 }
+
+#[test]
+fn the_least_way_is_that_of_the_nearest_robot() {
+    let homes = [[0.5, 0.5], [4.5, 0.5]];
+    let trips = [([3.0, 2.0], Some([1.0, 2.0]))];
+    let legs = Legs::of(&room([0.0, 0.0, 5.0, 3.0], &[], &homes, &trips));
+    let least = |legs: [Option<f64>; 2]| legs[0].unwrap().min(legs[1].unwrap());
+    let approach_s = [0, 1].map(|robot| legs.approach_s(robot, 0));
+    let home_s = [0, 1].map(|robot| legs.home_s(0, robot));
+    // The grasp is nearer to the one home, the release to the other.
+    assert!(approach_s[1] < approach_s[0] && home_s[0] < home_s[1]);
+    assert_eq!(legs.least_approach_s(0), Some(least(approach_s)));
+    assert_eq!(legs.least_home_s(0), Some(least(home_s)));
+}

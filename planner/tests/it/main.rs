@@ -1,6 +1,8 @@
 //! The planner as its users see it.
 
 #[cfg(test)]
+mod anytime;
+#[cfg(test)]
 mod bounds;
 #[cfg(test)]
 mod certificate;

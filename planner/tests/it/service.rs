@@ -316,6 +316,19 @@ fn versions_go_on_after_a_restart() {
 }
 
 #[test]
+fn whoever_waits_for_a_table_gets_one_after_a_restart() {
+    let mut service = Service::new("h1", Method::Restricted, HardMode::Cached);
+    service.world.header.constraints_version = 7;
+    service.table.version = 7;
+    // Nothing has failed, so nothing is looked for again.
+    service.step(&[], MUCH);
+    assert_eq!(
+        (service.tables, service.table.version, service.table.count),
+        (1, 8, 0)
+    );
+}
+
+#[test]
 fn the_hash_tells_states_apart() {
     let hashes = |task: u32, units: u64| {
         let mut service = Service::new("h1", Method::Restricted, HardMode::Cached);

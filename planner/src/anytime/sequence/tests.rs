@@ -178,3 +178,21 @@ fn attempts_end_and_are_charged_where_nothing_can_be_grasped() {
         assert!(room.sequencer.cells > before);
     }
 }
+
+#[test]
+fn every_flood_is_counted() {
+    let mut room = doorway();
+    let (from, to) = (room.start[0].grasp, room.start[1].grasp);
+    let Room {
+        ground,
+        sequencer,
+        start,
+        ..
+    } = &mut room;
+    sequencer.finds(ground, 0, from, to);
+    assert_eq!(sequencer.floods, 1);
+    sequencer.reaches(ground, 0, &[from], &[to]);
+    assert_eq!(sequencer.floods, 2);
+    sequencer.cheapest(ground, start, 0, 0, &[from], to, &mut Vec::new());
+    assert_eq!(sequencer.floods, 3);
+}

@@ -1,6 +1,6 @@
 //! What reservations have to be true to.
 
-use super::testing::{planned, written};
+use super::testing::{cells, planned, solver_of, written};
 use super::*;
 use crate::anytime::keep::kept;
 use crate::anytime::plan::lay::enter;
@@ -190,4 +190,54 @@ fn rested(solver: &Solver) -> Vec<Rested> {
     }
     rested.extend(at.into_iter().map(|(place, since)| (place, since, EVER)));
     rested
+}
+
+#[test]
+fn who_is_parked_in_the_way_makes_room_and_goes_home_after_that() {
+    let scene = cells(&["1.A.B.a", "##.####"]);
+    let mut solver = solver_of(&scene);
+    assert!(solver.first(&scene, 0).is_some());
+    let carries = |track: &Track| track.grips().count() == 2;
+    let tracks = solver.plan.tracks();
+    // The object comes from B's side, and A, in its dead end, goes aside.
+    assert_eq!([carries(&tracks[0]), carries(&tracks[1])], [false, true]);
+    assert!(!tracks[0].deeds.is_empty());
+    assert!((0..2).all(|robot| solver.plan.ends_at_home(robot)));
+}
+
+#[test]
+fn a_robot_that_puts_something_down_from_below_gets_out_from_under_it() {
+    let mut draft = cells(&["A...", ".a.1", "...."]).draft().clone();
+    draft.objects[0].pass_under = false;
+    // Steps are smaller than bodies, which so overlap while the robot comes out.
+    draft.objects[0].start[0] += 0.25;
+    let scene = Scene::new(draft).unwrap();
+    assert!(scene.lattice.pitch_m < 1.0 && scene.lifts_from_below(0));
+    assert!(solver_of(&scene).first(&scene, 0).is_some());
+}
+
+/// One transfer, two ways between it and home, and one search for the way as a whole.
+#[test]
+fn what_is_looked_for_is_counted_and_charged() {
+    let scene = cells(&["A.a.1"]);
+    let mut solver = solver_of(&scene);
+    solver.first(&scene, 0).unwrap();
+    assert_eq!(solver.ways(), 3 + 1);
+    let expanded = solver.router.expanded;
+    // Eight steps and two grips at least.
+    assert!(expanded >= 10, "{expanded}");
+    assert!(solver.units() >= UNITS_PER_INTERVAL * expanded + solver.sequencer.cells);
+}
+
+#[test]
+fn what_a_search_for_a_shortest_plan_looks_at_is_charged() {
+    let scene = cells(&["A.a1.", "....."]);
+    let mut solver = solver_of(&scene);
+    solver.first(&scene, 0).unwrap();
+    let before = solver.units();
+    while solver.shorten(&scene) {}
+    // Each of five steps from either end at least.
+    assert!(solver.small_configurations >= 10);
+    let least = solver.small_configurations * UNITS_PER_SMALL_CONFIGURATION;
+    assert!(solver.units() - before >= least);
 }
