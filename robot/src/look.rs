@@ -258,3 +258,23 @@ impl Look {
 fn may_fail(now: &Now<'_>) -> bool {
     now.holding().is_none()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_two_blockers_have_the_same_number_in_the_hash() {
+        let robots = (0..shm_types::capacity::MAX_ROBOTS).map(|robot| Blocker::Robot(Some(robot)));
+        let others = [Blocker::Anything, Blocker::Objects, Blocker::Robot(None)];
+        let mut codes: Vec<u64> = others
+            .into_iter()
+            .chain(robots)
+            .map(Blocker::code)
+            .collect();
+        let count = codes.len();
+        codes.sort_unstable();
+        codes.dedup();
+        assert_eq!(codes.len(), count);
+    }
+}

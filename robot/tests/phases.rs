@@ -2,6 +2,9 @@
 //! failed, is called, carries or is started again (rules 19–22, 24).
 #![expect(clippy::unwrap_used, reason = "a test may fail")]
 
+#[path = "phases/queued.rs"]
+mod queued;
+
 use robot::{Robot, RobotInput};
 use scene::{Method, Scene, Settings, point, vec};
 use shm_types::{
@@ -49,11 +52,16 @@ struct Bench {
     command: Command,
     answer: Option<HardAnswer>,
     units: u64,
+    /// Whether what is asked for is granted; else it is in the queue.
+    grants: bool,
 }
 
 impl Bench {
     fn new(method: Method) -> Self {
-        let scene = scene::parse(ROOMS, "rooms").unwrap();
+        Self::of(scene::parse(ROOMS, "rooms").unwrap(), method)
+    }
+
+    fn of(scene: Scene, method: Method) -> Self {
         let settings = Settings {
             method,
             ..Settings::default()
@@ -61,8 +69,8 @@ impl Bench {
         let mut snapshot: Box<WorldSnapshot> = zeroed();
         snapshot.header = SnapshotHeader {
             epoch: 1,
-            robot_count: 2,
-            object_count: 2,
+            robot_count: scene.counts().robots,
+            object_count: scene.counts().objects,
             ..SnapshotHeader::default()
         };
         for (robot, home) in snapshot.robots.iter_mut().zip(&scene.homes) {
@@ -92,6 +100,7 @@ impl Bench {
             command: Command::default(),
             answer: None,
             units: MUCH,
+            grants: true,
         }
     }
 
@@ -122,6 +131,10 @@ impl Bench {
         me.activity = command.activity;
         if command.path.id > me.request {
             me.request = command.path.id;
+            if !self.grants {
+                me.request_open = 1;
+                return;
+            }
             let ahead = command.path.points().get(1..).unwrap_or_default();
             me.grant_count = ahead.len() as u32;
             me.grant[..ahead.len()].copy_from_slice(ahead);
@@ -193,6 +206,10 @@ fn it_claims_looks_and_asks_for_a_tenth_of_a_metre_in_its_first_step() {
         .sum();
     assert!((0.1 - 1e-9..0.1 + 0.08).contains(&length_m), "{length_m}");
     assert_eq!(bench.command.settled_at_change, u64::MAX);
+    assert_eq!(
+        bench.command.valid_until_tick,
+        bench.settings.command_valid_ticks
+    );
 }
 
 #[test]
@@ -210,7 +227,11 @@ fn while_it_computes_it_stands_still() {
     }
     assert!(steps > 10, "{steps}");
     assert_eq!((bench.command.go, bench.command.path.id), (1, 1));
-    assert!(bench.command.counters.units > 100 * (steps - 1));
+    let units = bench.command.counters.units;
+    assert!(
+        (100 * (steps - 1) + 1..=100 * steps).contains(&units),
+        "{units}"
+    );
 }
 
 #[test]
@@ -279,7 +300,7 @@ fn objects_in_the_way_fail_the_task_at_once_and_the_planner_is_asked() {
     bench.tick();
     assert_eq!(bench.step(), None, "it does not ask every tick");
 
-    bench.answer = Some(HardAnswer {
+    let answer = HardAnswer {
         robot: 0,
         incarnation: 1,
         failure: 1,
@@ -289,7 +310,20 @@ fn objects_in_the_way_fail_the_task_at_once_and_the_planner_is_asked() {
         found: 0,
         infeasible: 0,
         reserved: 0,
-    });
+    };
+    // Answers to another robot, to a process before it, to another failure.
+    for (robot, incarnation, failure) in [(1, 1, 1), (0, 2, 1), (0, 1, 2)] {
+        bench.answer = Some(HardAnswer {
+            robot,
+            incarnation,
+            failure,
+            ..answer
+        });
+        bench.tick();
+        bench.step();
+        assert_eq!(bench.command.failure.answered, 0);
+    }
+    bench.answer = Some(answer);
     bench.tick();
     bench.step();
     assert_eq!(bench.command.failure.answered, 1);
