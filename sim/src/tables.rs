@@ -59,3 +59,45 @@ impl<T: Versioned> Tables<T> {
         self.legal[place].then(|| Checked::as_before(&*self.kept[place]))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shm_types::ConstraintTable;
+
+    const COUNTS: Counts = Counts {
+        robots: 1,
+        objects: 1,
+    };
+
+    fn table(version: u32) -> Box<ConstraintTable> {
+        let mut table = ConstraintTable::none();
+        table.version = version;
+        table
+    }
+
+    #[test]
+    fn the_one_in_force_is_kept_whatever_comes_after_it() {
+        let mut tables = Tables::new();
+        let in_force = 2;
+        for version in 1..20 {
+            tables.publish(&*table(version), COUNTS, in_force);
+            let kept = |version| {
+                tables
+                    .version(version)
+                    .is_some_and(|it| it.version == version)
+            };
+            assert_eq!(tables.newest().map(|(newest, _)| newest), Some(version));
+            assert!(kept(version) && (version < in_force || kept(in_force)));
+        }
+        // All others give way to newer ones.
+        assert!(tables.version(1).is_none());
+    }
+
+    #[test]
+    fn version_0_names_none() {
+        let mut tables = Tables::new();
+        tables.publish(&*table(0), COUNTS, 0);
+        assert!(tables.version(0).is_none());
+    }
+}

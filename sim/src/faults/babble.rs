@@ -80,3 +80,33 @@ fn path(
 fn any<T: Copy>(rng: &mut ChaCha8Rng, all: &[T]) -> T {
     all[rng.random_range(0..all.len())]
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use rand::SeedableRng;
+    use scene::{GenerateOptions, Settings};
+    use shm_types::{Checked, zeroed};
+    use world::World;
+
+    use super::*;
+
+    /// What is of this epoch, of the one before and of the one to come the world looks at.
+    #[test]
+    fn it_is_legal_and_claims_in_every_epoch_that_could_be_meant() {
+        let scene = scene::generate(&GenerateOptions::default()).unwrap().scene;
+        let mut snapshot: Box<WorldSnapshot> = zeroed();
+        World::new(&scene, Settings::default(), 0).snapshot_into(&mut snapshot);
+        snapshot.header.epoch = 7;
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut said = Command::default();
+        let mut epochs = BTreeSet::new();
+        for _ in 0..200 {
+            command(&mut rng, &snapshot, scene.counts(), 0, &mut said);
+            Checked::new(&said, scene.counts()).unwrap();
+            epochs.insert(said.claim.epoch);
+        }
+        assert!(epochs.into_iter().eq([6, 7, 8]));
+    }
+}

@@ -7,6 +7,9 @@
 //!
 //! With an empty plan it has the same state hash as `Simulation` at every tick.
 
+#[cfg(test)]
+mod tests;
+
 use std::rc::Rc;
 
 use planner::Planner;

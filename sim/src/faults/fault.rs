@@ -377,6 +377,61 @@ mod tests {
     }
 
     #[test]
+    fn messages_are_befallen_at_their_reader_or_at_the_robot_that_the_world_hears() {
+        for plans_ahead in [false, true] {
+            let plan = draw(&Terms {
+                seed: 4,
+                robots: 3,
+                plans_ahead,
+                ticks: 1_000,
+                count: 2_000,
+            });
+            let mut reports = 0;
+            for fault in plan {
+                let is_robot = matches!(fault.whom, Whom::Robot(_));
+                let is_right = match fault.channel {
+                    Some(Channel::Report) => fault.whom == Whom::World,
+                    Some(Channel::Snapshot) => fault.whom != Whom::World,
+                    Some(Channel::Table | Channel::Schedule) => fault.whom != Whom::Planner,
+                    Some(_) => is_robot,
+                    None => true,
+                };
+                assert!(is_right, "{fault}");
+                reports += u32::from(fault.channel == Some(Channel::Report));
+            }
+            assert!(reports > 10, "{reports}");
+        }
+    }
+
+    #[test]
+    fn a_fault_says_which_way_it_goes() {
+        let told = |kind, share| {
+            let fault = Fault {
+                number: 3,
+                tick: 40,
+                kind,
+                channel: None,
+                whom: Whom::World,
+                ticks: 5,
+                share,
+            };
+            fault.to_string()
+        };
+        let ahead = "#3 tick 40: clock-jump, the world, 5 ticks ahead";
+        let back = "#3 tick 40: clock-jump, the world, 5 ticks back";
+        assert_eq!(
+            [0, 1].map(|share| told(Kind::ClockJump, share)),
+            [ahead, back]
+        );
+        let torn = "#3 tick 40: world-crash, the world, in the middle of its journal";
+        let whole = "#3 tick 40: world-crash, the world";
+        assert_eq!(
+            [2, 3].map(|share| told(Kind::WorldCrash, share)),
+            [torn, whole]
+        );
+    }
+
+    #[test]
     fn numbers_read_as_lists_and_ranges() {
         assert_eq!("3,17,20-22".parse(), Ok(Numbers(vec![3, 17, 20, 21, 22])));
         assert_eq!("".parse(), Ok(Numbers(vec![])));

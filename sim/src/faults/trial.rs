@@ -4,6 +4,9 @@
 //! run must have ended after that, and what is a finding. Not responsible for: making a failing
 //! one small (`shrink.rs`).
 
+#[cfg(test)]
+mod tests;
+
 use std::fmt;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -215,3 +215,40 @@ fn look_at_claims(
 fn is_open(object: &ObjectState) -> bool {
     object.status != TaskStatus::Done.code()
 }
+
+#[cfg(test)]
+mod tests {
+    use shm_types::zeroed;
+
+    use super::*;
+
+    #[test]
+    fn who_moves_without_a_command_that_holds_is_found() {
+        let world = || {
+            let mut world: Box<WorldSnapshot> = zeroed();
+            (world.header.robot_count, world.robots[0].live) = (1, 1);
+            world
+        };
+        let (mut before, after) = (world(), world());
+        let mut motion: Box<MotionBatch> = zeroed();
+        motion.motion_count = 1;
+        motion.motions[0].body = BodyKind::Robot.code();
+        let mut watch = Watch::new(&before);
+        let told = |watch: &Watch, before: &WorldSnapshot| {
+            watch.look_at_motion(before, &after, &motion).is_none()
+        };
+        assert!(
+            !told(&watch, &before),
+            "no command at all, in the first tick"
+        );
+        watch.taken[0] = Taken {
+            sequence: 1,
+            valid_until_tick: 5,
+            request: 0,
+        };
+        before.header.tick = 5;
+        assert!(told(&watch, &before));
+        before.header.tick = 6;
+        assert!(!told(&watch, &before), "too late");
+    }
+}
