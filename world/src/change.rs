@@ -389,6 +389,29 @@ mod tests {
         assert_eq!(bench.header().scene_version, 1);
     }
 
+    /// Grown by the clearance, the new robot's corner is over the disc that another one carries; the
+    /// disc grown likewise would not reach that corner.
+    #[test]
+    fn a_new_robot_keeps_its_clearance_to_what_others_carry() {
+        let homes = [[1.0, 0.8], [8.0, 1.0]];
+        let scene = room(&homes, &OBJECTS, BELOW, "clearance = 0.1");
+        let mut draft = scene.draft().clone();
+        draft.objects[0].shape = scene::ShapeDraft::Circle(0.2);
+        let mut bench = Bench::with(Scene::new(draft).unwrap(), papers());
+        bench.claim(0, 0);
+        bench.drive(0, &[[1.0, 1.0]]);
+        bench.grasp(0);
+        bench.drive(0, &[[1.0, 0.6], [4.0, 0.6]]);
+        let disc = scene::vec(bench.object(0).position);
+        let beside = |gap: f64| add_robot((disc + Vec2::repeat(0.25 + gap)).into());
+        let by = Blocked::Robot(0);
+        assert_eq!(
+            refusal(&bench, beside(0.23)),
+            NotMade::Robot { robot: 2, by }
+        );
+        assert!(bench.world.prepare(&bench.scene, &[beside(0.25)]).is_ok());
+    }
+
     #[test]
     fn what_is_new_can_be_put_elsewhere_by_the_same_changes() {
         let mut bench = bench(ahead());

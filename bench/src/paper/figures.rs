@@ -230,6 +230,34 @@ mod tests {
     use super::*;
 
     #[test]
+    fn every_method_has_its_line_and_is_named() {
+        let columns = [
+            "set",
+            "compute",
+            "units_per_second",
+            "robots",
+            "method",
+            "solved",
+        ];
+        let table = (columns.into_iter()).fold(Table::new("runs", "Runs"), |table, name| {
+            table.key(name, "", "")
+        });
+        let mut table = table.key("computing_s", "", "");
+        for robots in ["1", "2"] {
+            for variant in VARIANTS {
+                let keys = ["small", "one", "100", robots, variant.word(), "1"].map(Value::from);
+                table.push(keys.into_iter().chain([Value::Number(2.5)]).collect());
+            }
+        }
+        let [world] = &worlds(&table)[..] else {
+            panic!("there is one");
+        };
+        let figure = planning(&table, world).unwrap().unwrap();
+        let names = figure.legend.iter().map(|(_, name)| name.as_str());
+        assert!(names.eq(VARIANTS.iter().map(|variant| variant.word())));
+    }
+
+    #[test]
     fn values_come_once_each_in_the_order_of_the_rows() {
         let mut table = Table::new("runs", "Runs").key("room", "", "");
         for room in ["b", "a", "b", "c", "a"] {

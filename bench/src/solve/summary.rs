@@ -551,6 +551,20 @@ mod tests {
     }
 
     #[test]
+    fn the_figure_of_ratios_names_its_groups_and_the_target() {
+        let rooms = [Set::Paper, Set::Generated]
+            .map(|set| [11.0, 12.0].map(|default_s| room(set, Some(default_s), None, Some(10.0))));
+        let figures = super::super::figures::all(rooms.as_flattened(), &[]).unwrap();
+        let legend = figures[0].legend.iter().map(|(_, name)| name.as_str());
+        let groups = ["paper and seeded rooms", "generated rooms"];
+        assert!(
+            legend.eq(groups
+                .into_iter()
+                .chain(["target in the paper's and seeded rooms"]))
+        );
+    }
+
+    #[test]
     fn rooms_in_which_another_method_was_faster_are_named_the_worst_first() {
         let rooms = [
             (10.0, 20.0),

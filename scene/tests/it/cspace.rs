@@ -320,3 +320,42 @@ fn where_an_object_was_left_makes_the_lattice_less_than_exact_but_no_coarser() {
     assert!(!off_it.exact);
     assert_eq!(off_it.pitch_m, on_it.pitch_m);
 }
+
+/// Where a body tapers, points beside a thin wall are free in row after row, and only the steps
+/// between them are not.
+#[test]
+fn a_tip_passes_beside_a_thin_wall_and_not_through_it() {
+    let mut between = 0;
+    for x in [2.01, 2.03, 2.05, 2.07, 2.09] {
+        let mut draft = Draft::room("tip", [0.0, 0.0, 4.0, 3.0]);
+        draft.resolution_m = 0.1;
+        draft.robot.shape = ShapeDraft::Polygon(vec![[-0.06, -0.5], [0.06, -0.5], [0.0, 0.5]]);
+        draft.walls = vec![WallDraft::Box([x, 1.5, x + 0.01, 3.0])];
+        draft.homes = vec![[1.0, 1.0]];
+        draft.objects = vec![ObjectDraft::paper([3.0, 2.0], None)];
+        let scene = Scene::new(draft).unwrap();
+        let lattice = &scene.lattice;
+        let mut space = Occupancy::new(&scene);
+        space.reset(&scene, ClassId(0));
+        // Steps to the right that lead through the wall, from one free point to another.
+        let crosses = |cell: u32| {
+            let (from, to) = (lattice.at(cell), lattice.at(cell + 1));
+            space.is_free(cell)
+                && space.is_free(cell + 1)
+                && !space.straight_is_free(&scene, from, to)
+        };
+        let inner =
+            (1..lattice.height - 1).flat_map(|y| (1..lattice.width - 1).map(move |x| (x, y)));
+        for cell in inner
+            .map(|(x, y)| y * lattice.width + x)
+            .filter(|&cell| crosses(cell))
+        {
+            let mut steps = Vec::new();
+            space.for_each_step(cell, |next, _| steps.push(next));
+            assert!(!steps.contains(&(cell + 1)), "{x}: {:?}", lattice.at(cell));
+            let is_first = !crosses(cell - lattice.width) && crosses(cell + lattice.width);
+            between += u32::from(is_first);
+        }
+    }
+    assert!(between > 0);
+}

@@ -353,3 +353,20 @@ proptest! {
         let _ = Checked::new(&*batch, COUNTS).map(|b| b.motions().len() + b.events().len());
     }
 }
+
+#[test]
+fn a_checked_snapshot_shows_the_live_ones_and_no_more() {
+    let mut world = snapshot();
+    for (id, robot) in world.robots.iter_mut().enumerate() {
+        robot.actions = id as u32;
+    }
+    for (id, object) in world.objects.iter_mut().enumerate() {
+        object.put_downs = id as u32;
+    }
+    let world = Checked::new(&*world, COUNTS).unwrap();
+    let robots: Vec<u32> = world.robots().iter().map(|robot| robot.actions).collect();
+    let objects: Vec<u32> = (world.objects().iter())
+        .map(|object| object.put_downs)
+        .collect();
+    assert_eq!((robots, objects), (vec![0, 1], vec![0, 1, 2]));
+}

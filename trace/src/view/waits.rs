@@ -10,6 +10,9 @@
 //! nothing is, because it took another way in the end or none, there is none. The geometry is the
 //! checker's.
 
+#[cfg(test)]
+mod tests;
+
 use crate::check::geometry::{Meeting, Solid, Vector};
 use crate::record::{Activity, Event, Happening, Motion, SceneRecord, TaskStatus};
 use crate::view::story::{RobotDoing, Story, Timeline, entry_at, note};
