@@ -72,9 +72,9 @@ impl Ground {
         self.touched.touch(object);
     }
 
-    /// Which objects may not lie where they lay at the last call.
-    pub(crate) const fn take_touched(&mut self) -> Touched {
-        self.touched.take()
+    /// Which objects may not lie where they lay.
+    pub(crate) const fn touched(&mut self) -> &mut Touched {
+        &mut self.touched
     }
 
     /// Where `object` lies on the ground.

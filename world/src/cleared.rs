@@ -8,7 +8,7 @@
 //! is as good as new while the robot is on it, its grant is no more than what is left of it, and
 //! all else that the answer depends on is the same ([`Terms`]).
 
-use scene::{ClassId, Scene, Vec2};
+use scene::{Scene, Vec2};
 use shm_types::capacity::MAX_PATH_POINTS;
 
 use crate::bodies::Bodies;
@@ -21,45 +21,41 @@ use crate::state::{Leaving, Robot};
 const ON_LINE_M: f64 = ARRIVAL_M / 1_000.0;
 
 /// What decides on an overlap besides where the robot is.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Terms {
-    class: ClassId,
+    /// What is in its hand, and by which grasp: that is the class of the body.
+    hand: Option<usize>,
+    holds: bool,
+    grasp: usize,
     /// The rest says what of the objects is an obstacle to it, and that none has come.
     put_downs: u64,
-    carries: bool,
     claim: Option<usize>,
     leaving: Leaving,
 }
 
 impl Terms {
-    fn of(scene: &Scene, bodies: &Bodies, robot: &Robot) -> Self {
+    #[inline]
+    fn of(bodies: &Bodies, robot: &Robot) -> Self {
         Self {
-            class: robot.class(scene),
+            hand: robot.hand.object(),
+            holds: robot.hand.holding().is_some(),
+            grasp: robot.grasp,
             put_downs: bodies.ground.put_downs(),
-            carries: robot.hand.object().is_some(),
             claim: robot.claim.map(|claim| claim.task),
             leaving: robot.leaving,
         }
     }
-
-    /// Whether they are these.
-    #[inline]
-    fn are_those_of(&self, scene: &Scene, bodies: &Bodies, robot: &Robot) -> bool {
-        self.class == robot.class(scene)
-            && self.put_downs == bodies.ground.put_downs()
-            && self.carries == robot.hand.object().is_some()
-            && self.claim == robot.claim.map(|claim| claim.task)
-            && self.leaving == robot.leaving
-    }
 }
 
 /// What is to be looked at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Change {
     /// In this tick the robot was where it was not known to be clear.
     pub(crate) strayed: bool,
-    /// Pieces of its grant from this one on are not known to be clear.
+    /// Pieces of its grant from this one on are not known to be clear,
     pub(crate) new_from: usize,
+    /// and this one from here on.
+    pub(crate) start: Vec2,
 }
 
 /// One robot's way.
@@ -67,59 +63,87 @@ pub(crate) struct Change {
 pub(crate) struct Cleared {
     /// On which terms; `None` if nothing is clear.
     terms: Option<Terms>,
-    /// Its corners; those before `at` are left behind.
-    corners: [Vec2; MAX_PATH_POINTS + 1],
+    /// Where the robot is on it.
+    at: Vec2,
+    /// Its corners; those before `next` are left behind.
+    corners: [Vec2; MAX_PATH_POINTS],
+    next: usize,
     count: usize,
-    at: usize,
     /// Box of what the body covers on it.
     region: Aabb,
-    /// What has changed since, and then on what terms and where the robot is now.
+    /// What has changed since, and then where the robot is now.
     change: Option<Change>,
-    now_on: Option<Terms>,
     now: Aabb,
 }
 
 impl Cleared {
     /// Nothing is.
     pub(crate) fn nothing() -> Self {
+        let nowhere = Aabb::around(Vec2::zeros(), Vec2::zeros());
         Self {
             terms: None,
-            corners: [Vec2::zeros(); MAX_PATH_POINTS + 1],
+            at: Vec2::zeros(),
+            corners: [Vec2::zeros(); MAX_PATH_POINTS],
+            next: 0,
             count: 0,
-            at: 0,
-            region: Aabb::around(Vec2::zeros(), Vec2::zeros()),
+            region: nowhere,
             change: None,
-            now_on: None,
-            now: Aabb::around(Vec2::zeros(), Vec2::zeros()),
+            now: nowhere,
         }
     }
 
-    /// Compares where `robot` was in this tick, and what is granted to it, with the way.
-    pub(crate) fn compare(&mut self, scene: &Scene, bodies: &Bodies, robot: &Robot) {
-        let known = (self.terms.as_ref()).is_some_and(|t| t.are_those_of(scene, bodies, robot));
+    /// Compares where `robot` was in this tick, and what is granted to it, with the way. Whether
+    /// what is in its hand, and on the ground, is the same.
+    #[inline]
+    pub(crate) fn compare(&mut self, scene: &Scene, bodies: &Bodies, robot: &Robot) -> bool {
+        let known = self
+            .terms
+            .is_some_and(|terms| terms == Terms::of(bodies, robot));
         let strayed = !known || !self.follow(robot.track.corners());
-        let points = robot.grant.points();
-        let left = if strayed {
-            &[]
+        if strayed || !is_same(self.ahead(), robot.grant.points()) {
+            self.find_change(scene, bodies, robot, strayed);
         } else {
-            &self.corners[self.at + 1..self.count]
-        };
+            self.change = None;
+        }
+        known
+    }
+
+    /// What is left of the way.
+    fn ahead(&self) -> &[Vec2] {
+        &self.corners[self.next..self.count]
+    }
+
+    /// Says what of the grant is new, and drops what of the way is not part of it: what was given
+    /// back is no longer clear, somebody else may get it.
+    #[cold]
+    fn find_change(&mut self, scene: &Scene, bodies: &Bodies, robot: &Robot, strayed: bool) {
+        let points = robot.grant.points();
+        let left = if strayed { &[] } else { self.ahead() };
         let same = points.iter().zip(left).take_while(|(a, b)| a == b);
         let new_from = same.count();
-        // What was given back is no longer clear: somebody else may get it.
-        self.count = self.count.min(self.at + 1 + new_from);
-        self.change = (strayed || new_from < points.len()).then_some(Change { strayed, new_from });
+        let before = new_from
+            .checked_sub(1)
+            .map_or(robot.position, |last| points[last]);
+        // A piece that goes on beyond where it ended is as clear as it was up to there.
+        let ended = (left.get(new_from).zip(points.get(new_from)))
+            .filter(|&(&ended, &point)| is_between(before, point, ended));
+        let start = ended.map_or(before, |(&ended, _)| ended);
+        self.count = self.next + new_from;
+        let change = Change {
+            strayed,
+            new_from,
+            start,
+        };
+        self.change = (strayed || new_from < points.len()).then_some(change);
         if self.change.is_some() {
-            let terms = Terms::of(scene, bodies, robot);
             let places = robot.track.corners().iter().map(|&(_, place)| place);
             let places = places.chain(points.iter().copied());
-            self.now = bodies.region_along(terms.class, robot.position, places);
-            self.now_on = Some(terms);
+            self.now = bodies.region_along(robot.class(scene), robot.position, places);
         }
     }
 
     /// What has changed since the way was looked at, if anything has.
-    pub(crate) fn change(&self) -> Option<Change> {
+    pub(crate) const fn change(&self) -> Option<Change> {
         self.change
     }
 
@@ -133,45 +157,44 @@ impl Cleared {
     }
 
     /// What was compared is clear, of the grant the first `clear` points.
-    pub(crate) fn accept(&mut self, robot: &Robot, clear: usize) {
-        (self.terms, self.region) = (self.now_on, self.now);
-        self.corners[0] = robot.position;
-        self.corners[1..=clear].copy_from_slice(&robot.grant.points()[..clear]);
-        (self.at, self.count) = (0, clear + 1);
+    pub(crate) fn accept(&mut self, bodies: &Bodies, robot: &Robot, clear: usize) {
+        self.terms = Some(Terms::of(bodies, robot));
+        self.region = self.now;
+        self.at = robot.position;
+        self.corners[..clear].copy_from_slice(&robot.grant.points()[..clear]);
+        (self.next, self.count) = (0, clear);
     }
 
     /// Goes along the way with a tick's motion, corner by corner, and leaves behind what is
     /// passed; `false` as soon as that is somewhere else.
+    #[inline]
     fn follow(&mut self, track: &[(f64, Vec2)]) -> bool {
-        let mut last = None;
-        for &(_, place) in track {
-            if let Some(corner) = last {
-                self.pass(corner);
-            }
-            let from = self.corners[self.at];
-            let to = self.corners[(self.at + 1).min(self.count - 1)];
-            if !is_between(from, to, place) {
-                return false;
-            }
-            self.corners[self.at] = place;
-            last = Some(place);
-        }
-        if let Some(place) = last {
-            self.pass(place);
-        }
-        true
+        let starts_here = track.first().is_some_and(|&(_, start)| start == self.at);
+        starts_here && track[1..].iter().all(|&(_, place)| self.go_to(place))
     }
 
-    /// Leaves corners at `place` behind.
-    fn pass(&mut self, place: Vec2) {
-        while self.at + 1 < self.count && self.corners[self.at + 1] == place {
-            self.at += 1;
+    /// Goes on straight to `place`; `false` if the way does not lead there.
+    fn go_to(&mut self, place: Vec2) -> bool {
+        let ahead = self.ahead();
+        let leads_there = |&corner: &Vec2| is_between(self.at, corner, place);
+        if !ahead.first().is_some_and(leads_there) {
+            return false;
         }
+        let passed = ahead.iter().take_while(|&&corner| corner == place).count();
+        self.next += passed;
+        self.at = place;
+        true
     }
 }
 
+/// Whether two lists have the same points.
+fn is_same(points: &[Vec2], others: &[Vec2]) -> bool {
+    let same = |(a, b): (&Vec2, &Vec2)| a.x == b.x && a.y == b.y;
+    points.len() == others.len() && points.iter().zip(others).all(same)
+}
+
 /// Whether `place` is on the straight line from `from` to `to`.
-fn is_between(from: Vec2, to: Vec2, place: Vec2) -> bool {
+pub(crate) fn is_between(from: Vec2, to: Vec2, place: Vec2) -> bool {
     if place == from || place == to {
         return true;
     }

@@ -14,10 +14,10 @@ use scene::{Scene, Vec2};
 use shm_types::{EventKind, TaskStatus};
 
 use crate::bodies::Sweep;
-use crate::cleared::{Change, Cleared};
+use crate::cleared::{Change, Cleared, is_between};
 use crate::journal::Event;
 use crate::path::ARRIVAL_M;
-use crate::state::{Object, Robot, id, is_at};
+use crate::state::{Robot, id, is_at};
 use crate::step::World;
 
 /// What is checked, by what would be found.
@@ -185,47 +185,55 @@ impl Violation {
 }
 
 impl World {
-    /// The first invariant broken in the tick that has just been moved, if any.
+    /// The first invariant broken in the tick that has just been moved, if any: what every robot
+    /// shows by itself comes before what has changed between them.
     pub(crate) fn find_violation(&mut self, scene: &Scene) -> Option<Violation> {
         let before = self.bodies.tests();
         let mut cleared = std::mem::take(&mut self.cleared);
-        for (robot, cleared) in self.robots.iter().zip(&mut cleared) {
-            cleared.compare(scene, &self.bodies, robot);
+        let mut found = None;
+        let (mut changed, mut holding) = (0, 0);
+        for (i, (robot, cleared)) in self.robots.iter().zip(&mut cleared).enumerate() {
+            let known = cleared.compare(scene, &self.bodies, robot);
+            if !known {
+                self.objects.touched().check_all();
+            }
+            let has_changed = cleared.change().is_some();
+            changed += u64::from(has_changed);
+            holding += u64::from(robot.hand.holding().is_some());
+            if found.is_none() {
+                found = self.check_motion(i, !has_changed);
+                found = found.or_else(|| self.check_hand(scene, i));
+            }
         }
-        self.count_checks(&cleared);
-        let found = (0..self.robots.len())
-            .find_map(|i| self.check_robot(scene, i, &mut cleared))
-            .or_else(|| self.check_objects());
+        self.count_checks(changed, holding);
+        if changed > 0 && found.is_none() {
+            let mut all = 0..self.robots.len();
+            found = all.find_map(|i| self.check_changed(scene, i, &mut cleared));
+        }
+        found = found.or_else(|| self.check_objects());
         self.cleared = cleared;
         self.counters.checks.swept_tests += self.bodies.tests() - before;
         found
     }
 
-    /// Robot `i` by itself, and what has changed of it against everything around.
-    fn check_robot(&self, scene: &Scene, i: usize, cleared: &mut [Cleared]) -> Option<Violation> {
-        let change = cleared[i].change();
+    /// What has changed of robot `i` against everything around.
+    fn check_changed(&self, scene: &Scene, i: usize, cleared: &mut [Cleared]) -> Option<Violation> {
+        let change = cleared[i].change()?;
+        let start = self.straight_from(i, change);
+        let clear = self.clear_ahead(scene, i, start, change);
+        let seen = clear > 0 && start != self.robots[i].position;
         let found = self
-            .check_motion(i, change.is_none())
-            .or_else(|| self.check_hand(scene, i));
-        let Some(change) = change else {
-            return found;
-        };
-        let found = found
-            .or_else(|| self.check_surroundings(scene, i, change))
+            .check_surroundings(scene, i, change, usize::from(seen))
             .or_else(|| self.check_others(scene, i, change, cleared));
         if found.is_none() {
-            let clear = self.clear_ahead(scene, i, change);
-            cleared[i].accept(&self.robots[i], clear);
+            cleared[i].accept(&self.bodies, &self.robots[i], clear);
         }
         found
     }
 
-    fn count_checks(&mut self, cleared: &[Cleared]) {
+    /// Notes what was looked at: `changed` robots with each other and with all others.
+    fn count_checks(&mut self, changed: u64, holding: u64) {
         let (robots, objects) = (self.robots.len() as u64, self.objects.len() as u64);
-        let changed = cleared.iter().filter(|c| c.change().is_some()).count() as u64;
-        let holding = self.robots.iter().filter(|r| r.hand.holding().is_some());
-        let holding = holding.count() as u64;
-        // Those that changed, with each other and with all others.
         let changed_pairs = changed * (2 * robots - changed).saturating_sub(1) / 2;
         let pairs = robots * robots.saturating_sub(1) / 2;
         let checks = &mut self.counters.checks;
@@ -265,18 +273,36 @@ impl World {
         })
     }
 
-    /// Where robot `i` was during the tick, unless that was found clear before.
-    fn check_surroundings(&self, scene: &Scene, i: usize, change: Change) -> Option<Violation> {
+    /// Where robot `i` was during the tick, unless that was found clear before: all of it, but for
+    /// the last `seen` straight pieces.
+    fn check_surroundings(
+        &self,
+        scene: &Scene,
+        i: usize,
+        change: Change,
+        seen: usize,
+    ) -> Option<Violation> {
         if !change.strayed {
             return None;
         }
         let robot = &self.robots[i];
         let class = robot.class(scene);
-        if robot.track.corners().len() == 1 {
+        let corners = robot.track.corners();
+        if corners.len() == 1 {
             return self.obstacle(scene, i, Sweep::standing(class, robot.track.end()));
         }
-        let mut pieces = robot.track.pieces();
+        let mut pieces = robot.track.pieces().take(corners.len() - 1 - seen);
         pieces.find_map(|((_, from), (_, to))| self.obstacle(scene, i, Sweep { class, from, to }))
+    }
+
+    /// Where what is new of robot `i`'s way begins: where its last straight motion did, if it
+    /// goes straight on, so that both are looked at in one.
+    fn straight_from(&self, i: usize, change: Change) -> Vec2 {
+        let robot = &self.robots[i];
+        let ahead = robot.grant.first().filter(|_| change.strayed);
+        let last = ahead.zip(robot.track.pieces().last());
+        last.filter(|&(ahead, ((_, from), _))| is_between(from, ahead, robot.position))
+            .map_or(change.start, |(_, ((_, from), _))| from)
     }
 
     /// What robot `i` would overlap on a sweep: a wall or a grounded object.
@@ -294,11 +320,11 @@ impl World {
     }
 
     /// How many points of robot `i`'s grant it can go on to without overlapping anything that
-    /// stands: from there on its motion is looked at tick by tick.
-    fn clear_ahead(&self, scene: &Scene, i: usize, change: Change) -> usize {
+    /// stands, the new ones from `start`: from there on its motion is looked at tick by tick.
+    fn clear_ahead(&self, scene: &Scene, i: usize, start: Vec2, change: Change) -> usize {
         let robot = &self.robots[i];
         let ahead = robot.grant.points().len() - change.new_from;
-        let pieces = pieces(scene, robot).skip(change.new_from).take(ahead);
+        let pieces = pieces_from(scene, robot, start, change.new_from).take(ahead);
         let clear = pieces.take_while(|piece| self.obstacle(scene, i, *piece).is_none());
         change.new_from + clear.count()
     }
@@ -314,7 +340,12 @@ impl World {
     ) -> Option<Violation> {
         let robot = &self.robots[i];
         let class = robot.class(scene);
-        let region = cleared[i].region();
+        let region = if change.strayed {
+            cleared[i].region()
+        } else {
+            let points = robot.grant.points()[change.new_from..].iter();
+            (self.bodies).region_along(class, change.start, points.copied())
+        };
         for (j, other) in self.robots.iter().enumerate() {
             if j == i || !region.meets(&cleared[j].region()) {
                 continue;
@@ -331,7 +362,7 @@ impl World {
                     other: second,
                 });
             }
-            if self.grants_meet(scene, robot, change.new_from, other) {
+            if self.grants_meet(scene, robot, change, other) {
                 return Some(Violation::Grants {
                     robot: first,
                     other: second,
@@ -341,42 +372,65 @@ impl World {
         None
     }
 
-    /// Whether what is granted to `robot` from its piece `new_from` on meets what is granted to
-    /// `other`.
-    fn grants_meet(&self, scene: &Scene, robot: &Robot, new_from: usize, other: &Robot) -> bool {
+    /// Whether what is new of `robot`'s grant meets what is granted to `other`.
+    fn grants_meet(&self, scene: &Scene, robot: &Robot, change: Change, other: &Robot) -> bool {
         if robot.grant.is_empty() && other.grant.is_empty() {
             return false;
         }
-        pieces(scene, robot).skip(new_from).any(|piece| {
+        pieces_from(scene, robot, change.start, change.new_from).any(|piece| {
             pieces(scene, other).any(|other| self.bodies.sweeps_meet(scene, piece, false, other))
         })
     }
 
-    fn check_objects(&self) -> Option<Violation> {
-        let sound = |(index, object): (usize, &Object)| {
-            let place = self.bodies.ground.place(index);
-            let gripped = object
-                .holder
-                .or(object.claimed_by)
-                .is_some_and(|i| self.robots[i].hand.object() == Some(index));
-            match (object.holder, place) {
-                (None, Some(at)) => at == object.position && at == object.rest && !gripped,
-                (None, None) => gripped && is_at(object.position, object.rest),
-                (Some(i), None) => self.robots[i].hand.holding() == Some(index),
-                (Some(_), Some(_)) => false,
+    /// The objects of which something could have changed: they are noted wherever they can be, and
+    /// all are looked at when a hand is not what it was.
+    fn check_objects(&mut self) -> Option<Violation> {
+        for word in 0..self.objects.len().div_ceil(64) {
+            let mut unchecked = self.objects.touched().take_unchecked(word);
+            unchecked |= self.bodies.ground.touched().take_unchecked(word);
+            while unchecked != 0 {
+                let index = 64 * word + unchecked.trailing_zeros() as usize;
+                unchecked &= unchecked - 1;
+                if index < self.objects.len() && !self.is_sound(index) {
+                    self.objects.touched().check_all();
+                    return Some(Violation::Lost { object: id(index) });
+                }
             }
-        };
-        let lost = self.objects.iter().enumerate().find(|o| !sound(*o));
-        lost.map(|(index, _)| Violation::Lost { object: id(index) })
+        }
+        None
+    }
+
+    /// Whether an object is in one place only, and whoever has it knows.
+    fn is_sound(&self, index: usize) -> bool {
+        let object = &self.objects[index];
+        let hand = |robot: usize| self.robots[robot].hand;
+        let gripped =
+            (object.holder.or(object.claimed_by)).is_some_and(|i| hand(i).object() == Some(index));
+        match (object.holder, self.bodies.ground.place(index)) {
+            (None, Some(at)) => at == object.position && at == object.rest && !gripped,
+            (None, None) => gripped && is_at(object.position, object.rest),
+            (Some(i), None) => hand(i).holding() == Some(index),
+            (Some(_), Some(_)) => false,
+        }
     }
 }
 
 /// The straight pieces of a robot's remaining grant; standing there if it has none.
 fn pieces<'a>(scene: &'a Scene, robot: &'a Robot) -> impl Iterator<Item = Sweep> + 'a {
+    pieces_from(scene, robot, robot.position, 0)
+}
+
+/// From `start` on to the points of its grant, but the first `passed`.
+fn pieces_from<'a>(
+    scene: &'a Scene,
+    robot: &'a Robot,
+    start: Vec2,
+    passed: usize,
+) -> impl Iterator<Item = Sweep> + 'a {
     let class = robot.class(scene);
-    let ends = robot.grant.points();
-    let starts = std::iter::once(robot.position).chain(ends.iter().copied());
-    let stand: Option<Vec2> = ends.is_empty().then_some(robot.position);
+    let ends = &robot.grant.points()[passed..];
+    let starts = std::iter::once(start).chain(ends.iter().copied());
+    let stand: Option<Vec2> = ends.is_empty().then_some(start);
     starts
         .zip(ends.iter().copied().chain(stand))
         .map(move |(from, to)| Sweep { class, from, to })
@@ -487,8 +541,18 @@ mod tests {
         bench.world.objects[1].position.x += 1e-3;
         assert_eq!(found(&mut bench), Some(Violation::Lost { object: 1 }));
         bench.world.objects[1].position.x = 5.0;
-        bench.world.robots[0].hand = Hand::Empty;
-        assert_eq!(found(&mut bench), Some(Violation::Lost { object: 0 }));
+        for hand in [
+            Hand::Empty,
+            Hand::Closing {
+                object: 0,
+                ticks: 1,
+            },
+        ] {
+            bench.world.robots[0].hand = hand;
+            assert_eq!(found(&mut bench), Some(Violation::Lost { object: 0 }));
+            bench.world.robots[0].hand = Hand::Holding { object: 0 };
+            assert_eq!(found(&mut bench), None);
+        }
     }
 
     #[test]
@@ -525,6 +589,22 @@ mod tests {
         bench.world.robots[0].grant.push(Vec2::new(6.0, 1.0));
         let violation = Violation::Grants { robot: 0, other: 1 };
         assert_eq!(found(&mut bench), Some(violation));
+    }
+
+    #[test]
+    fn a_grant_that_goes_on_into_another_is_found() {
+        let mut bench = bench();
+        let at = bench.world.robots[0].position;
+        bench.world.robots[0].grant.push(Vec2::new(at.x, 4.0));
+        bench.world.robots[0].grant.push(Vec2::new(8.0, 4.0));
+        assert_eq!(found(&mut bench), None);
+        bench.world.robots[0].grant.push(Vec2::new(8.0, 2.0));
+        assert_eq!(found(&mut bench), None);
+        for (y, meets) in [(1.55, false), (1.45, true), (1.55, false), (0.9, true)] {
+            bench.world.robots[0].grant.replace_last(Vec2::new(8.0, y));
+            let violation = Violation::Grants { robot: 0, other: 1 };
+            assert_eq!(found(&mut bench), meets.then_some(violation), "{y}");
+        }
     }
 
     #[test]

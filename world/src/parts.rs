@@ -54,8 +54,8 @@ impl World {
         let count = self.part_count();
         self.saving.sums.resize(count - 1, 0);
         let (objects, ground) = (
-            self.objects.take_touched(),
-            self.bodies.ground.take_touched(),
+            self.objects.touched().take_unsaved(),
+            self.bodies.ground.touched().take_unsaved(),
         );
         let constraints = self.constraints.take_touched();
         for part in 1..count {

@@ -10,6 +10,7 @@ use shm_types::{
 
 use crate::cleared::Cleared;
 use crate::path::Path;
+use crate::state::Hand;
 use crate::testing::{Bench, TICK_M};
 use crate::track::Track;
 
@@ -404,6 +405,14 @@ enum Harm {
     Forget(usize),
     /// An object comes to lie elsewhere.
     PutDown(usize, [f64; 2]),
+    /// It is said to be elsewhere.
+    Misplace(usize, [f64; 2]),
+    /// It is no longer on the ground.
+    Lift(usize),
+    /// A robot no longer has what it holds.
+    LetGo(usize),
+    /// It goes on closing its grip.
+    GripAgain(usize),
 }
 
 fn harm() -> impl Strategy<Value = Harm> {
@@ -415,8 +424,12 @@ fn harm() -> impl Strategy<Value = Harm> {
         6 => (robot.clone(), [-0.6..0.6, -0.6..0.6]).prop_map(|(i, by)| Harm::Grant(i, by)),
         2 => robot.clone().prop_map(Harm::TakeBack),
         2 => robot.clone().prop_map(Harm::GiveAgain),
-        1 => robot.prop_map(Harm::Forget),
+        1 => robot.clone().prop_map(Harm::Forget),
         1 => (0..OBJECTS, little()).prop_map(|(o, by)| Harm::PutDown(o, by)),
+        1 => (0..OBJECTS, little()).prop_map(|(o, by)| Harm::Misplace(o, by)),
+        1 => (0..OBJECTS).prop_map(Harm::Lift),
+        1 => robot.clone().prop_map(Harm::LetGo),
+        1 => robot.prop_map(Harm::GripAgain),
     ]
 }
 
@@ -460,6 +473,15 @@ fn inflict(bench: &mut Bench, harm: &Harm, taken: &mut [Path; ROBOTS]) {
                 ground.put(*object, at + by(step));
                 world.objects[*object].position = at + by(step);
                 world.objects[*object].rest = at + by(step);
+            }
+        }
+        Harm::Misplace(object, step) => world.objects[*object].position += by(step),
+        Harm::Lift(object) => world.bodies.ground.take(*object),
+        Harm::LetGo(i) => world.robots[*i].hand = Hand::Empty,
+        Harm::GripAgain(i) => {
+            let hand = &mut world.robots[*i].hand;
+            if let Hand::Holding { object } = *hand {
+                *hand = Hand::Closing { object, ticks: 1 };
             }
         }
     }

@@ -4,6 +4,8 @@
 //! Not responsible for: how they change (one file per idea), how they look on the wire
 //! (`wire.rs`).
 
+use std::num::NonZero;
+
 use scene::{ClassId, ROBOT_ALONE, Scene, Vec2};
 use shm_types::capacity::ROBOT_WORDS;
 use shm_types::{Activity, Grip, Phase, TaskStatus, Wait};
@@ -65,11 +67,20 @@ const MAX_LEAVING: usize = 4;
 /// Objects that a robot has given up or put down while it, or path granted to it, was still at
 /// their place. They stay waived for it until it has left.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Leaving([Option<usize>; MAX_LEAVING]);
+pub(crate) struct Leaving([Option<NonZero<u32>>; MAX_LEAVING]);
 
 impl Leaving {
+    /// As an object is kept here: such slots are compared in one go, in every tick.
+    const fn slot(object: usize) -> Option<NonZero<u32>> {
+        NonZero::new(id(object) + 1)
+    }
+
+    fn object(slot: NonZero<u32>) -> usize {
+        slot.get() as usize - 1
+    }
+
     pub(crate) fn contains(&self, object: usize) -> bool {
-        self.0.contains(&Some(object))
+        self.0.contains(&Self::slot(object))
     }
 
     pub(crate) fn is_full(&self) -> bool {
@@ -80,29 +91,29 @@ impl Leaving {
         if !self.contains(object)
             && let Some(free) = self.0.iter_mut().find(|slot| slot.is_none())
         {
-            *free = Some(object);
+            *free = Self::slot(object);
         }
     }
 
     /// Forgets those for which `left` holds.
     pub(crate) fn forget(&mut self, mut left: impl FnMut(usize) -> bool) {
         for slot in &mut self.0 {
-            if slot.is_some_and(&mut left) {
+            if slot.is_some_and(|slot| left(Self::object(slot))) {
                 *slot = None;
             }
         }
     }
 
     pub(crate) fn iter(&self) -> impl Iterator<Item = usize> + '_ {
-        self.0.iter().copied().flatten()
+        self.0.iter().copied().flatten().map(Self::object)
     }
 
-    pub(crate) const fn slots(&self) -> [Option<usize>; MAX_LEAVING] {
-        self.0
+    pub(crate) fn slots(&self) -> [Option<usize>; MAX_LEAVING] {
+        self.0.map(|slot| slot.map(Self::object))
     }
 
-    pub(crate) const fn of(slots: [Option<usize>; MAX_LEAVING]) -> Self {
-        Self(slots)
+    pub(crate) fn of(slots: [Option<usize>; MAX_LEAVING]) -> Self {
+        Self(slots.map(|object| object.and_then(Self::slot)))
     }
 }
 
