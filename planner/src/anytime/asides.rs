@@ -59,7 +59,7 @@ pub(crate) fn vary(
     random: &mut ChaCha8Rng,
 ) -> Option<(Hops, Vec<Item>)> {
     let rests = start.rests();
-    let ways = ways_of(scene, ground, start, &rests, (hops, order));
+    let ways = ways_of(ground, start, &rests, (hops, order));
     if ways.blames.is_empty() {
         return None;
     }
@@ -118,7 +118,6 @@ pub(crate) fn vary(
 
 /// The shortest ways of all moves of an order, and who is on them.
 fn ways_of(
-    scene: &Scene,
     ground: &mut Ground,
     start: &Start,
     rests: &[Rest],
@@ -136,8 +135,8 @@ fn ways_of(
         let Hop { from, to, .. } = &hops.list[next[object]];
         let carrying = ground.carrying(object, to.by);
         let alone = ROBOT_ALONE.0;
-        let to_grasp = ground.field(scene, alone, from.grasp);
-        let to_goal = ground.field(scene, carrying, to.grasp);
+        let to_grasp = ground.field(alone, from.grasp);
+        let to_goal = ground.field(carrying, to.grasp);
         let ways = [
             trace(ground, alone, &to_grasp, cells[robot]),
             trace(ground, carrying, &to_goal, from.grasp),
@@ -168,7 +167,7 @@ fn ways_of(
 /// A shortest way down a field.
 fn trace(ground: &Ground, class: usize, field: &Field, mut cell: u32) -> Way {
     let mut cells = vec![cell];
-    while field[cell as usize] > 1 {
+    while let Some(left) = field.time(cell).filter(|&left| left > 0) {
         let steps = ground.walls(class).steps(cell);
         let next = (0..8)
             .filter(|direction| steps >> direction & 1 == 1)
@@ -179,8 +178,7 @@ fn trace(ground: &Ground, class: usize, field: &Field, mut cell: u32) -> Way {
                 )
             })
             .find(|&(direction, next)| {
-                field[next as usize] != 0
-                    && field[next as usize] + duration(direction) == field[cell as usize]
+                (field.time(next)).is_some_and(|then| then + duration(direction) == left)
             });
         let Some((_, next)) = next else { break };
         cell = next;
@@ -206,17 +204,17 @@ fn place_for(
         None => rests[object].place.open_by()?,
     };
     let class = ground.carrying(object, by);
-    let near = ground.field(scene, class, rests[object].place.held(by).grasp);
+    let near = ground.field(class, rests[object].place.held(by).grasp);
     let far = if first < end {
-        ground.field(scene, class, hops.list[end - 1].to.grasp)
+        ground.field(class, hops.list[end - 1].to.grasp)
     } else {
         Field::clone(&near)
     };
     let mut points: Vec<(Time, u32)> = Vec::new();
     for _ in 0..POINTS_LOOKED_AT {
-        let cell = random.random_range(0..ground.points());
-        if near[cell] > 0 && far[cell] > 0 {
-            points.push((near[cell] + far[cell], cell as u32));
+        let cell = random.random_range(0..ground.points()) as u32;
+        if let (Some(near), Some(far)) = (near.time(cell), far.time(cell)) {
+            points.push((near + far, cell));
         }
     }
     points.sort_unstable();

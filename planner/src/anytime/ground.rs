@@ -11,16 +11,16 @@
 #[cfg(test)]
 mod tests;
 
+use std::cell::Cell;
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::rc::Rc;
 
 use scene::{
-    Body, Budget, ClassId, Lattice, Occupancy, ROBOT_ALONE, Scene, Settings, Shape, Vec2, overlap,
+    Body, ClassId, Lattice, Occupancy, ROBOT_ALONE, Scene, Settings, Shape, Vec2, overlap,
 };
-use shm_types::Counters;
 
+use crate::anytime::distances::{Distances, Walls};
 use crate::anytime::track::Place;
-use crate::field::DistanceField;
 use crate::frontier::{DIAGONAL, STRAIGHT};
 use crate::search::DIRECTIONS;
 
@@ -51,9 +51,8 @@ pub(crate) struct Mask {
     half: i32,
 }
 
-/// Distances to one place, walls only: of each lattice point the time plus one, 0 where there is
-/// no way.
-pub(crate) type Field = Arc<[u32]>;
+/// Distances to one place, walls only.
+pub(crate) type Field = Rc<Distances>;
 
 /// The static part of what is planned with.
 pub(crate) struct Ground {
@@ -61,13 +60,12 @@ pub(crate) struct Ground {
     pub(crate) width: i32,
     pub(crate) height: i32,
     pub(crate) classes: usize,
-    walls: Vec<Occupancy>,
+    walls: Vec<Rc<Walls>>,
     /// What stands there for ever and is no wall of the scene.
     pub(crate) obstacles: Vec<(Shape, Vec2)>,
     /// By class that is kept away, then class that is there.
     masks: Vec<Mask>,
     fields: HashMap<(usize, u32), Field>,
-    flood: DistanceField,
     pub(crate) offsets: [i32; 8],
     /// Class of a robot that carries each object.
     carrying: Vec<Vec<usize>>,
@@ -77,21 +75,22 @@ pub(crate) struct Ground {
     pub(crate) second_per_unit: f64,
     pub(crate) grasp: Time,
     pub(crate) release: Time,
-    pub(crate) counters: Counters,
+    /// Lattice points that floods have come to.
+    flooded: Rc<Cell<u64>>,
 }
 
 impl Ground {
     /// With what stands where robots are gone, beside the walls.
     pub(crate) fn new(scene: &Scene, settings: &Settings, obstacles: Vec<(Shape, Vec2)>) -> Self {
         let classes = scene.class_count();
-        let walls: Vec<Occupancy> = (0..classes)
+        let walls: Vec<Rc<Walls>> = (0..classes)
             .map(|class| {
                 let mut walls = Occupancy::new(scene);
                 walls.reset(scene, ClassId(class));
                 for (shape, at) in &obstacles {
                     walls.block(scene, shape, *at, true);
                 }
-                walls
+                Rc::new(Walls::new(&scene.lattice, walls))
             })
             .collect();
         let second_per_unit =
@@ -121,7 +120,7 @@ impl Ground {
             width: scene.lattice.width as i32,
             height: scene.lattice.height as i32,
             classes,
-            offsets: walls[ROBOT_ALONE.0].offsets(),
+            offsets: walls[ROBOT_ALONE.0].steps.offsets(),
             grasps: (scene.objects.iter())
                 .map(|object| object.grasps.iter().map(|grasp| grasp.offset).collect())
                 .collect(),
@@ -132,11 +131,10 @@ impl Ground {
             obstacles,
             masks,
             fields: HashMap::new(),
-            flood: DistanceField::new(scene),
             second_per_unit,
             grasp: units(scene.robot.grasp_ns),
             release: units(scene.robot.release_ns),
-            counters: Counters::default(),
+            flooded: Rc::default(),
         }
     }
 
@@ -163,7 +161,7 @@ impl Ground {
     /// Where a class of bodies can be among the walls alone.
     #[inline]
     pub(crate) fn walls(&self, class: usize) -> &Occupancy {
-        &self.walls[class]
+        &self.walls[class].steps
     }
 
     /// What a body of class `there` keeps one of class `kept` away from.
@@ -259,25 +257,18 @@ impl Ground {
         near.min_by(|a, b| far(a).total_cmp(&far(b)))
     }
 
-    /// Distances to `to` for a class of bodies, walls only; worked out once.
-    pub(crate) fn field(&mut self, scene: &Scene, class: usize, to: u32) -> Field {
-        if let Some(field) = self.fields.get(&(class, to)) {
-            return Arc::clone(field);
-        }
-        let occupancy = self.flood.occupancy();
-        occupancy.reset(scene, ClassId(class));
-        for (shape, at) in &self.obstacles {
-            occupancy.block(scene, shape, *at, true);
-        }
-        self.flood.begin(scene, scene.lattice.at(to));
-        let mut budget = Budget::new(u64::MAX);
-        let done = self.flood.advance(&mut budget, &mut self.counters);
-        debug_assert!(done.is_ready());
-        let mut costs = vec![0; self.points()];
-        self.flood.keep(&mut costs);
-        let field: Field = costs.into();
-        self.fields.insert((class, to), Arc::clone(&field));
-        field
+    /// Distances to `to` for a class of bodies, walls only; each is worked out once.
+    pub(crate) fn field(&mut self, class: usize, to: u32) -> Field {
+        let field = self.fields.entry((class, to)).or_insert_with(|| {
+            let walls = Rc::clone(&self.walls[class]);
+            Rc::new(Distances::new(walls, to, Rc::clone(&self.flooded)))
+        });
+        Rc::clone(field)
+    }
+
+    /// Lattice points that floods have come to.
+    pub(crate) fn flooded(&self) -> u64 {
+        self.flooded.get()
     }
 
     pub(crate) fn time(&self, s: f64) -> Time {

@@ -124,12 +124,12 @@ impl Joint {
             to_goal: (goals.iter().enumerate())
                 .map(|(object, goal)| {
                     let goal = goal.as_ref().filter(|place| place.is_open())?;
-                    Some(ground.field(scene, objects[object].class.0, goal.grasp))
+                    Some(ground.field(objects[object].class.0, goal.grasp))
                 })
                 .collect(),
             to_home: homes
                 .iter()
-                .map(|&home| ground.field(scene, ROBOT_ALONE.0, home))
+                .map(|&home| ground.field(ROBOT_ALONE.0, home))
                 .collect(),
             known: HashMap::new(),
             list: Vec::new(),
@@ -323,7 +323,7 @@ impl Joint {
             let Some(field) = field else { continue };
             let held = (0..self.robots).find(|&robot| at[3 * robot + 1] == object as u16);
             let cell = held.map_or(self.objects(at)[object], |robot| at[3 * robot]);
-            ahead = ahead.saturating_add(4 * field[cell as usize].checked_sub(1)?);
+            ahead = ahead.saturating_add(4 * field.time(cell.into())?);
             let is_there = self.goals[object] == Some(cell);
             if held.is_none() && !is_there {
                 // Somebody has yet to come.
@@ -339,7 +339,7 @@ impl Joint {
         if ahead == 0 {
             for robot in 0..self.robots {
                 let field = &self.to_home[robot];
-                ahead = ahead.saturating_add(field[at[3 * robot] as usize].saturating_sub(1) / 8);
+                ahead = ahead.saturating_add(field.time(at[3 * robot].into()).unwrap_or(0) / 8);
             }
         }
         Some(ahead)

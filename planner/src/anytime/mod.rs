@@ -14,6 +14,8 @@
 
 mod anew;
 mod asides;
+mod distances;
+mod greedy;
 mod ground;
 mod improve;
 mod joint;

@@ -14,7 +14,8 @@ use rand_chacha::ChaCha8Rng;
 use scene::{ClassId, Event, Pieces, ROBOT_ALONE, Scene};
 use shm_types::capacity::MAX_ROBOTS;
 
-use crate::anytime::ground::{EVER, Ground, Time};
+use crate::anytime::distances::Distances;
+use crate::anytime::ground::{EVER, Field, Ground, Time};
 use crate::anytime::sequence::Step;
 use crate::anytime::track::{Place, Rest, Start};
 use crate::frontier::NOWHERE;
@@ -37,16 +38,14 @@ pub(crate) struct Hops {
     pub(crate) list: Vec<Hop>,
     /// By object: its first move in the list, and the end of its moves.
     pub(crate) of: Vec<(usize, usize)>,
-    /// By robot: when it is free, and how long it takes home from there.
-    free: Vec<(Time, Time)>,
-    /// By robot and move: from where the robot is free to the grasp.
-    approach: Vec<Vec<Time>>,
-    /// By move and move: from one's release to the other's grasp.
-    between: Vec<Vec<Time>>,
+    /// By robot: when it is free, and where; nowhere if it is gone.
+    free: Vec<(Time, Option<u32>)>,
+    /// By move: to its grasp.
+    to_grasp: Vec<Field>,
+    /// By robot: to its home.
+    to_home: Vec<Field>,
     /// By move: its transfer and both grips.
     transfer: Vec<Time>,
-    /// By move and robot: from the release home.
-    back: Vec<Vec<Time>>,
     /// By move: which moves have to come before it.
     before: Vec<Vec<usize>>,
 }
@@ -82,37 +81,21 @@ impl Hops {
             return None;
         }
         let alone = ROBOT_ALONE.0;
-        let read = |field: &[u32], cell: u32| field[cell as usize].checked_sub(1).unwrap_or(EVER);
-        let mut approach = vec![Vec::new(); homes.len()];
-        let mut between = vec![Vec::new(); list.len()];
         let mut transfer = Vec::new();
-        let mut back = vec![Vec::new(); list.len()];
+        let mut to_grasp = Vec::new();
         for hop in &list {
-            let field = ground.field(scene, alone, hop.from.grasp);
-            for (row, track) in approach.iter_mut().zip(&start.robots) {
-                let way = if track.is_gone {
-                    EVER
-                } else {
-                    read(&field, track.free.0)
-                };
-                row.push(way);
-            }
-            for (other, row) in list.iter().zip(&mut between) {
-                row.push(read(&field, other.to.grasp));
-            }
-            let field = ground.field(scene, ground.carrying(hop.object, hop.to.by), hop.to.grasp);
-            let way = read(&field, hop.from.grasp);
+            to_grasp.push(ground.field(alone, hop.from.grasp));
+            let field = ground.field(ground.carrying(hop.object, hop.to.by), hop.to.grasp);
+            let way = exact(&field, hop.from.grasp);
             transfer.push(way.saturating_add(ground.grasp + ground.release));
         }
-        let mut free = Vec::new();
-        for (&home, track) in homes.iter().zip(&start.robots) {
-            let field = ground.field(scene, alone, home);
-            let (cell, time) = track.free;
-            free.push((time, if track.is_gone { 0 } else { read(&field, cell) }));
-            for (hop, row) in list.iter().zip(&mut back) {
-                row.push(read(&field, hop.to.grasp));
-            }
-        }
+        let to_home = homes
+            .iter()
+            .map(|&home| ground.field(alone, home))
+            .collect();
+        let free = (start.robots.iter())
+            .map(|track| (track.free.1, (!track.is_gone).then_some(track.free.0)))
+            .collect();
         let mut before = precedence(scene, ground, &list, &of, homes, &rests);
         for order in &scene.before {
             let hop = |(object, event): (usize, Event)| {
@@ -136,18 +119,33 @@ impl Hops {
             list,
             of,
             free,
-            approach,
-            between,
+            to_grasp,
+            to_home,
             transfer,
-            back,
             before,
         })
     }
 
-    /// Whether an object is moved more than once.
-    pub(crate) fn is_moved_again(&self, object: usize) -> bool {
-        let (first, end) = self.of[object];
-        end > first + 1
+    /// From where a robot is free to the grasp of a move.
+    fn approach(&self, robot: usize, hop: usize, far: impl Fn(&Distances, u32) -> Time) -> Time {
+        let at = self.free[robot].1;
+        at.map_or(EVER, |at| far(&self.to_grasp[hop], at))
+    }
+
+    /// From one move's release to the other's grasp.
+    fn between(&self, hop: usize, next: usize, far: impl Fn(&Distances, u32) -> Time) -> Time {
+        far(&self.to_grasp[next], self.list[hop].to.grasp)
+    }
+
+    /// From a move's release to a robot's home.
+    fn back(&self, hop: usize, robot: usize, far: impl Fn(&Distances, u32) -> Time) -> Time {
+        far(&self.to_home[robot], self.list[hop].to.grasp)
+    }
+
+    /// Home from where a robot is free; nothing if it is gone.
+    fn home(&self, robot: usize) -> Time {
+        let at = self.free[robot].1;
+        at.map_or(0, |at| exact(&self.to_home[robot], at))
     }
 
     /// The moves of an order, in turn: number of the move, and its robot.
@@ -178,8 +176,8 @@ impl Hops {
             }
             done[hop] = true;
             let way = match last[robot] {
-                usize::MAX => self.approach[robot][hop],
-                before => self.between[before][hop],
+                usize::MAX => self.approach(robot, hop, exact),
+                before => self.between(before, hop, exact),
             };
             busy[robot] = busy[robot]
                 .saturating_add(way)
@@ -188,8 +186,8 @@ impl Hops {
         }
         let ends = busy.iter().enumerate().map(|(robot, busy)| {
             busy.saturating_add(match last[robot] {
-                usize::MAX => self.free[robot].1,
-                last => self.back[last][robot],
+                usize::MAX => self.home(robot),
+                last => self.back(last, robot, exact),
             })
         });
         Some(ends.max().unwrap_or(0))
@@ -205,9 +203,9 @@ impl Hops {
         let mut later: [Option<(usize, Time)>; MAX_ROBOTS] = [None; MAX_ROBOTS];
         let mut home_by = vec![limit; order.len()];
         for (place, &(hop, robot)) in moves.iter().enumerate().rev() {
-            let back = self.back[hop][robot];
+            let back = self.back(hop, robot, exact);
             let ahead = later[robot].map_or(back, |(next, takes)| {
-                self.between[hop][next].saturating_add(takes)
+                self.between(hop, next, exact).saturating_add(takes)
             });
             home_by[place] = limit.saturating_sub(ahead.saturating_sub(back));
             later[robot] = Some((hop, self.transfer[hop].saturating_add(ahead)));
@@ -234,21 +232,46 @@ impl Clocks {
         }
     }
 
-    /// When a robot would be home again after the next move of an object; none if that comes too
-    /// early.
-    pub(crate) fn home_by(&self, hops: &Hops, object: usize, robot: usize) -> Option<Time> {
-        let hop = self.next[object];
-        let early = hops.before[hop].iter().any(|&before| !self.done[before]);
-        let done = self.released_by(hops, hop, robot);
-        let home_by = done.saturating_add(hops.back[hop][robot]);
-        (!early && home_by < EVER).then_some(home_by)
+    /// Whether something has to come before the next move of an object that has not.
+    pub(crate) fn is_early(&self, hops: &Hops, object: usize) -> bool {
+        let before = &hops.before[self.next[object]];
+        before.iter().any(|&before| !self.done[before])
     }
 
-    fn released_by(&self, hops: &Hops, hop: usize, robot: usize) -> Time {
+    /// When a robot would be home again after the next move of an object; [`EVER`] if it has no
+    /// way.
+    pub(crate) fn home_by(&self, hops: &Hops, object: usize, robot: usize) -> Time {
+        self.home_by_as(hops, object, robot, exact)
+    }
+
+    /// When at the earliest, without a look for ways.
+    pub(crate) fn home_by_at_least(&self, hops: &Hops, object: usize, robot: usize) -> Time {
+        self.home_by_as(hops, object, robot, Distances::least)
+    }
+
+    fn home_by_as(
+        &self,
+        hops: &Hops,
+        object: usize,
+        robot: usize,
+        far: impl Fn(&Distances, u32) -> Time + Copy,
+    ) -> Time {
+        let hop = self.next[object];
+        let done = self.released_by(hops, hop, robot, far);
+        done.saturating_add(hops.back(hop, robot, far))
+    }
+
+    fn released_by(
+        &self,
+        hops: &Hops,
+        hop: usize,
+        robot: usize,
+        far: impl Fn(&Distances, u32) -> Time,
+    ) -> Time {
         let (busy, last) = self.busy[robot];
         let way = match last {
-            None => hops.approach[robot][hop],
-            Some(before) => hops.between[before][hop],
+            None => hops.approach(robot, hop, far),
+            Some(before) => hops.between(before, hop, far),
         };
         busy.saturating_add(way).saturating_add(hops.transfer[hop])
     }
@@ -256,10 +279,15 @@ impl Clocks {
     /// Takes note that a robot makes the next move of an object.
     pub(crate) fn make(&mut self, hops: &Hops, object: usize, robot: usize) {
         let hop = self.next[object];
-        self.busy[robot] = (self.released_by(hops, hop, robot), Some(hop));
+        self.busy[robot] = (self.released_by(hops, hop, robot, exact), Some(hop));
         self.done[hop] = true;
         self.next[object] += 1;
     }
+}
+
+/// How far it is from a lattice point; [`EVER`] if there is no way.
+fn exact(field: &Distances, from: u32) -> Time {
+    field.time(from).unwrap_or(EVER)
 }
 
 /// Which moves have to come before which: single objects that are in the way where they start, or

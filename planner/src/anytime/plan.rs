@@ -92,12 +92,11 @@ impl Plan {
         &mut self,
         ground: &mut Ground,
         router: &mut Router,
-        scene: &Scene,
         wanted: &Move,
     ) -> Option<Time> {
         let robot = wanted.robot;
         let tail = self.take_tail(ground, robot);
-        let found = self.try_from(ground, router, scene, wanted);
+        let found = self.try_from(ground, router, wanted);
         if found.is_none() {
             // From its end there would be no other way: a way along the tail was looked for too.
             self.put_tail_back(ground, robot, tail);
@@ -129,11 +128,10 @@ impl Plan {
         &mut self,
         ground: &mut Ground,
         router: &mut Router,
-        scene: &Scene,
         wanted: &Move,
     ) -> Option<Time> {
         let clear = self.clear_from(ground, wanted.robot, &wanted.to).ok()?;
-        let mut legs = self.legs(ground, scene, wanted, clear);
+        let mut legs = self.legs(ground, wanted, clear);
         let mut way = std::mem::take(&mut self.way);
         let mut found = router.find(
             ground,
@@ -153,13 +151,12 @@ impl Plan {
 
     /// The legs of a move that begins where the robot's tail does; its object is put down no
     /// earlier than `clear`.
-    fn legs(&self, ground: &mut Ground, scene: &Scene, wanted: &Move, clear: Time) -> [Leg; 3] {
+    fn legs(&self, ground: &mut Ground, wanted: &Move, clear: Time) -> [Leg; 3] {
         let left = self.tracks[wanted.robot].left.as_ref();
         let rest = &self.rests[wanted.object];
         let moved = self.resting(wanted.object, rest.turns);
         let (alone, carrying) = (ROBOT_ALONE.0, ground.carrying(wanted.object, wanted.to.by));
-        let mut to =
-            |class: usize, cell: u32| Target::Place(cell, ground.field(scene, class, cell));
+        let mut to = |class: usize, cell: u32| Target::Place(cell, ground.field(class, cell));
         [
             Leg {
                 class: alone,
@@ -259,7 +256,6 @@ impl Plan {
         &mut self,
         ground: &mut Ground,
         router: &mut Router,
-        scene: &Scene,
     ) -> Option<Time> {
         let mut progress = true;
         while progress {
@@ -270,7 +266,7 @@ impl Plan {
                     continue;
                 }
                 let home = self.homes[robot];
-                let target = Target::Place(home, ground.field(scene, ROBOT_ALONE.0, home));
+                let target = Target::Place(home, ground.field(ROBOT_ALONE.0, home));
                 let gone = self.go(ground, router, robot, target).is_some();
                 progress |= gone;
                 away |= !gone;

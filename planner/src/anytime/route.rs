@@ -12,6 +12,7 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::rc::Rc;
 
 use crate::anytime::ground::{EVER, Field, Ground, Time, duration};
 use crate::anytime::timeline::{Gap, Owner, Resting, Skip, Timeline};
@@ -34,7 +35,7 @@ pub(crate) enum Target {
     /// To a place, with the distances to it.
     Place(u32, Field),
     /// To wherever the robot may stay for ever, but for the cells with a mark.
-    Anywhere(Option<Field>),
+    Anywhere(Option<Rc<[u32]>>),
 }
 
 /// A leg.
@@ -196,7 +197,7 @@ impl Router {
                 Then::Stay => 0,
             };
             let way = match &quest.legs[index].target {
-                Target::Place(_, field) => field[from as usize].checked_sub(1)?,
+                Target::Place(_, field) => field.time(from)?,
                 Target::Anywhere(_) => 0,
             };
             self.rest[index - 1] = self.rest[index] + way + grip;
@@ -400,7 +401,7 @@ impl Leg {
     #[inline]
     fn ahead(&self, cell: u32) -> Option<Time> {
         match &self.target {
-            Target::Place(_, field) => field[cell as usize].checked_sub(1),
+            Target::Place(_, field) => field.time(cell),
             Target::Anywhere(_) => Some(0),
         }
     }

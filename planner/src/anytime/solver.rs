@@ -12,8 +12,7 @@ pub(super) mod testing;
 mod tests;
 mod under_way;
 
-use std::cmp::Reverse;
-use std::collections::{BinaryHeap, HashSet};
+use std::collections::HashSet;
 use std::rc::Rc;
 
 use rand::SeedableRng;
@@ -21,10 +20,11 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use scene::{ROBOT_ALONE, Scene, Settings};
 
+use crate::anytime::greedy::Offers;
 use crate::anytime::ground::{EVER, Ground, Time};
 use crate::anytime::joint::Joint;
 use crate::anytime::known::Known;
-use crate::anytime::order::{Clocks, Hops, Item};
+use crate::anytime::order::{Hops, Item};
 use crate::anytime::plan::Plan;
 use crate::anytime::route::Router;
 use crate::anytime::sequence::{Sequencer, Step};
@@ -190,7 +190,7 @@ impl Solver {
 
     /// Cells expanded so far.
     pub(crate) fn cells(&self) -> u64 {
-        self.router.expanded + self.ground.counters.cells_expanded + self.sequencer.cells
+        self.router.expanded + self.ground.flooded() + self.sequencer.cells
     }
 
     /// Ways looked for so far.
@@ -200,7 +200,7 @@ impl Solver {
 
     /// Work done so far, units.
     pub(crate) fn units(&self) -> u64 {
-        let floods = self.ground.counters.cells_expanded + self.sequencer.cells;
+        let floods = self.ground.flooded() + self.sequencer.cells;
         self.router.expanded * UNITS_PER_INTERVAL
             + floods
             + self.weighing
@@ -288,33 +288,14 @@ impl Solver {
         sequence: &[u32],
     ) -> Option<(Time, Vec<Item>)> {
         self.begin();
-        let mut left = sequence.to_vec();
-        let mut clocks = Clocks::new(hops);
+        let mut offers = Offers::new(hops, sequence, self.homes.len(), self.mode.in_turn);
         let mut order: Vec<Item> = Vec::new();
-        while !left.is_empty() {
-            let looked_at = if self.mode.in_turn { 1 } else { left.len() };
-            let mut candidates = Vec::new();
-            for (place, &object) in left[..looked_at].iter().enumerate() {
-                if hops.is_moved_again(object as usize) && left[..place].contains(&object) {
-                    continue;
-                }
-                for robot in 0..self.homes.len() {
-                    let done = clocks.home_by(hops, object as usize, robot);
-                    candidates.extend(done.map(|done| Reverse((done, place, robot))));
-                }
-            }
-            // The soonest first; the others are seldom looked at.
-            let mut candidates = BinaryHeap::from(candidates);
-            let taken =
-                std::iter::from_fn(|| candidates.pop()).find(|&Reverse((_, place, robot))| {
-                    self.commit(scene, hops, &order, (left[place], robot as u32), EVER)
-                });
-            let Reverse((_, place, robot)) = taken?;
-            let object = left.remove(place);
-            clocks.make(hops, object as usize, robot);
-            order.push((object, robot as u32));
+        while order.len() < sequence.len() {
+            let mut commits = |item| self.commit(scene, hops, &order, item, EVER);
+            let item = offers.take_soonest(&mut commits)?;
+            order.push(item);
         }
-        Some((self.send_all_home(scene)?, order))
+        Some((self.send_all_home()?, order))
     }
 
     /// Nothing committed.
@@ -347,7 +328,7 @@ impl Solver {
         };
         let (plan, ground, router) = (&mut self.plan, &mut self.ground, &mut self.router);
         if self.mode.makes_room {
-            let done = plan.commit_making_room(ground, router, scene, &wanted);
+            let done = plan.commit_making_room(ground, router, &wanted);
             return done.is_some();
         }
         let known = self.known.way(&wanted);
@@ -356,7 +337,7 @@ impl Solver {
                 self.weighing += way.len() as u64 * UNITS_PER_PIECE;
                 plan.commit_known(ground, &wanted, way)
             }
-            None => plan.commit(ground, router, scene, &wanted),
+            None => plan.commit(ground, router, &wanted),
         };
         if done.is_some() {
             self.known.commit(&wanted, plan.way());
@@ -379,14 +360,14 @@ impl Solver {
                 return None;
             }
         }
-        self.send_all_home(scene)
+        self.send_all_home()
     }
 
     /// Sends everybody home, as the last part of a plan. Where a robot is gone, the others may
     /// have no way home.
-    fn send_all_home(&mut self, scene: &Scene) -> Option<Time> {
+    fn send_all_home(&mut self) -> Option<Time> {
         let (plan, ground, router) = (&mut self.plan, &mut self.ground, &mut self.router);
-        let done = plan.send_all_home(ground, router, scene);
+        let done = plan.send_all_home(ground, router);
         done.or_else(|| self.is_short.then(|| self.plan.makespan()))
     }
 

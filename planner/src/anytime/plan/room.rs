@@ -3,7 +3,7 @@
 //! Responsible for: who is in the way, and where they go.
 //! Not responsible for: the move itself (the parent module).
 
-use scene::{ROBOT_ALONE, Scene};
+use scene::ROBOT_ALONE;
 
 use crate::anytime::ground::{Ground, Time};
 use crate::anytime::plan::Plan;
@@ -16,16 +16,15 @@ impl Plan {
         &mut self,
         ground: &mut Ground,
         router: &mut Router,
-        scene: &Scene,
         wanted: &Move,
     ) -> Option<Time> {
         for _ in 0..2 * self.tracks.len() {
-            if let Some(done) = self.commit(ground, router, scene, wanted) {
+            if let Some(done) = self.commit(ground, router, wanted) {
                 return Some(done);
             }
             let tail = self.take_tail(ground, wanted.robot);
             let clear = self.clear_from(ground, wanted.robot, &wanted.to);
-            let mut legs = self.legs(ground, scene, wanted, clear.unwrap_or(0));
+            let mut legs = self.legs(ground, wanted, clear.unwrap_or(0));
             // Where it goes then is another matter.
             legs[2].target = Target::Anywhere(None);
             let mut way = std::mem::take(&mut self.way);
