@@ -69,8 +69,6 @@ pub(crate) struct Cleared {
     corners: [Vec2; MAX_PATH_POINTS],
     next: usize,
     count: usize,
-    /// As far as nothing stands straight on from its end, if that was looked at.
-    beyond: Option<Vec2>,
     /// Box of what the body covers on it.
     region: Aabb,
     /// What has changed since, and then where the robot is now.
@@ -88,7 +86,6 @@ impl Cleared {
             corners: [Vec2::zeros(); MAX_PATH_POINTS],
             next: 0,
             count: 0,
-            beyond: None,
             region: nowhere,
             change: None,
             now: nowhere,
@@ -159,22 +156,8 @@ impl Cleared {
         }
     }
 
-    /// As far as nothing stands that could be met, straight on from where the way ended.
-    pub(crate) fn beyond(&self) -> Option<Vec2> {
-        let goes_on = self.change.is_some_and(|change| !change.strayed);
-        self.beyond.filter(|_| goes_on)
-    }
-
-    /// What was compared is clear, of the grant the first `clear` points, and nothing stands
-    /// `beyond` the last.
-    pub(crate) fn accept(
-        &mut self,
-        bodies: &Bodies,
-        robot: &Robot,
-        clear: usize,
-        beyond: Option<Vec2>,
-    ) {
-        self.beyond = beyond;
+    /// What was compared is clear, of the grant the first `clear` points.
+    pub(crate) fn accept(&mut self, bodies: &Bodies, robot: &Robot, clear: usize) {
         self.terms = Some(Terms::of(bodies, robot));
         self.region = self.now;
         self.at = robot.position;

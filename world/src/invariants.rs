@@ -20,9 +20,6 @@ use crate::path::ARRIVAL_M;
 use crate::state::{Robot, id, is_at};
 use crate::step::World;
 
-/// How far beyond a grant that goes on straight is looked for what stands there, m.
-const AHEAD_M: f64 = 0.25;
-
 /// What is checked, by what would be found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Invariant {
@@ -223,13 +220,13 @@ impl World {
     fn check_changed(&self, scene: &Scene, i: usize, cleared: &mut [Cleared]) -> Option<Violation> {
         let change = cleared[i].change()?;
         let start = self.straight_from(i, change);
-        let (clear, beyond) = self.clear_ahead(scene, i, start, change, cleared[i].beyond());
+        let clear = self.clear_ahead(scene, i, start, change);
         let seen = clear > 0 && start != self.robots[i].position;
         let found = self
             .check_surroundings(scene, i, change, usize::from(seen))
             .or_else(|| self.check_others(scene, i, change, cleared));
         if found.is_none() {
-            cleared[i].accept(&self.bodies, &self.robots[i], clear, beyond);
+            cleared[i].accept(&self.bodies, &self.robots[i], clear);
         }
         found
     }
@@ -323,40 +320,13 @@ impl World {
     }
 
     /// How many points of robot `i`'s grant it can go on to without overlapping anything that
-    /// stands, the new ones from `start`: from there on its motion is looked at tick by tick. A
-    /// grant that goes on straight, a little in every tick, is looked at farther ahead, so that
-    /// what lies within `beyond` is known.
-    fn clear_ahead(
-        &self,
-        scene: &Scene,
-        i: usize,
-        start: Vec2,
-        change: Change,
-        beyond: Option<Vec2>,
-    ) -> (usize, Option<Vec2>) {
+    /// stands, the new ones from `start`: from there on its motion is looked at tick by tick.
+    fn clear_ahead(&self, scene: &Scene, i: usize, start: Vec2, change: Change) -> usize {
         let robot = &self.robots[i];
         let ahead = robot.grant.points().len() - change.new_from;
-        let is_clear = |piece: &Sweep| self.obstacle(scene, i, *piece).is_none();
-        let mut pieces = pieces_from(scene, robot, start, change.new_from).take(ahead);
-        if ahead == 1
-            && !change.strayed
-            && let Some(piece) = pieces.next()
-        {
-            let Sweep { class, from, to } = piece;
-            if beyond.is_some_and(|far| is_between(from, far, to)) {
-                return (change.new_from + 1, beyond);
-            }
-            let far = (to - from)
-                .try_normalize(ARRIVAL_M)
-                .map(|straight| to + straight * AHEAD_M);
-            if let Some(to) = far
-                && is_clear(&Sweep { class, from, to })
-            {
-                return (change.new_from + 1, far);
-            }
-            return (change.new_from + usize::from(is_clear(&piece)), None);
-        }
-        (change.new_from + pieces.take_while(is_clear).count(), None)
+        let pieces = pieces_from(scene, robot, start, change.new_from).take(ahead);
+        let clear = pieces.take_while(|piece| self.obstacle(scene, i, *piece).is_none());
+        change.new_from + clear.count()
     }
 
     /// What has changed of robot `i` against every other: bodies during the tick, granted path
@@ -635,31 +605,6 @@ mod tests {
             let violation = Violation::Grants { robot: 0, other: 1 };
             assert_eq!(found(&mut bench), meets.then_some(violation), "{y}");
         }
-    }
-
-    #[test]
-    fn a_grant_that_goes_on_little_by_little_into_an_object_does_not_hide_it() {
-        let mut bench = bench();
-        put(&mut bench, 1, 5.0, 1.5);
-        assert_eq!(found(&mut bench), None);
-        bench.world.robots[1].grant.push(Vec2::new(5.0, 1.6));
-        assert_eq!(found(&mut bench), None);
-        for step in 1..=12 {
-            let end = Vec2::new(5.0, 1.6 + 0.1 * f64::from(step));
-            bench.world.robots[1].grant.replace_last(end);
-            assert_eq!(found(&mut bench), None, "nobody is there yet");
-        }
-        bench.world.tick_m = 9.0;
-        let robot = &mut bench.world.robots[1];
-        robot.granted_m = robot.grant.length_from(robot.position);
-        robot.track = Track::walk(robot.position, &robot.grant, 9.0);
-        robot.grant.drop_front(robot.track.used());
-        (robot.position, robot.moved) = (robot.track.end(), true);
-        let violation = Violation::Object {
-            robot: 1,
-            object: 1,
-        };
-        assert_eq!(found(&mut bench), Some(violation));
     }
 
     #[test]

@@ -398,8 +398,6 @@ enum Harm {
     Walk(usize, f64),
     /// It is granted a straight piece more.
     Grant(usize, [f64; 2]),
-    /// Its grant goes on straight, by a share of its last piece.
-    Prolong(usize, f64),
     /// Its grant is taken back, and given to it again.
     TakeBack(usize),
     GiveAgain(usize),
@@ -424,7 +422,6 @@ fn harm() -> impl Strategy<Value = Harm> {
         2 => (robot.clone(), little()).prop_map(|(i, by)| Harm::Jump(i, by)),
         6 => (robot.clone(), 0.0..0.3).prop_map(|(i, by)| Harm::Walk(i, by)),
         6 => (robot.clone(), [-0.6..0.6, -0.6..0.6]).prop_map(|(i, by)| Harm::Grant(i, by)),
-        6 => (robot.clone(), 0.0..0.5).prop_map(|(i, share)| Harm::Prolong(i, share)),
         2 => robot.clone().prop_map(Harm::TakeBack),
         2 => robot.clone().prop_map(Harm::GiveAgain),
         1 => robot.clone().prop_map(Harm::Forget),
@@ -462,14 +459,6 @@ fn inflict(bench: &mut Bench, harm: &Harm, taken: &mut [Path; ROBOTS]) {
             let robot = &mut world.robots[*i];
             let end = robot.grant_end() + by(step);
             robot.grant.push(end);
-        }
-        Harm::Prolong(i, share) => {
-            let robot = &mut world.robots[*i];
-            let points = robot.grant.points();
-            let before = points.iter().rev().nth(1).unwrap_or(&robot.position);
-            let end = robot.grant_end();
-            let farther = end + (end - before) * *share;
-            robot.grant.replace_last(farther);
         }
         Harm::TakeBack(i) => {
             taken[*i] = world.robots[*i].grant;
