@@ -16,7 +16,7 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::{output, scenario};
 use plan::Plan;
 use report::Report;
-use victim::Victim;
+use victim::{SetUps, Victim};
 
 /// A run without any sign of life for so long is wedged.
 const WEDGED: Duration = Duration::from_secs(30);
@@ -29,13 +29,15 @@ pub(crate) fn main(args: &ChaosArgs) -> Outcome {
     let scene = scenario::load(&args.scenario, args.robots)?.scene;
     let mut plan = Plan::new(args);
     let mut report = Report::new(args, scene.homes.len());
+    let mut set_ups = SetUps::new();
     while plan.is_open() && report.failures.len() < MOST_FAILED {
         let number = report.runs;
         report.runs += 1;
-        let victim = Victim::start(args, number);
+        let victim = Victim::start(args, number, set_ups);
         let mut victim = victim
             .map_err(|error| Failure::system(format!("a run could not be started: {error}")))?;
         let ended = victim.torment(&mut plan, WEDGED);
+        set_ups = victim.set_ups();
         report.take(victim, ended, &mut plan);
         if output::is_watched() {
             output::complain(&report.progress(&plan));

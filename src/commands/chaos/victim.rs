@@ -38,6 +38,9 @@ const FIRST_GUESS_NS: u64 = 40_000_000;
 /// A blow this close to the end of the last task may have come after it, ns.
 const MARGIN_NS: u64 = 5_000_000;
 
+/// How long the set-up of each role usually lasts, ns.
+pub(crate) type SetUps = BTreeMap<Target, u64>;
+
 /// A blow that was dealt.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Dealt {
@@ -98,7 +101,7 @@ pub(crate) struct Victim {
     armed: Vec<Armed>,
     stalled: Vec<(u32, u64)>,
     set_up_blows: usize,
-    set_up_ns: BTreeMap<Target, u64>,
+    set_ups: SetUps,
     /// Since when no task is open, as far as is known.
     done_ns: Option<u64>,
     pub(crate) dealt: Vec<Dealt>,
@@ -110,7 +113,8 @@ pub(crate) struct Victim {
 }
 
 impl Victim {
-    pub(crate) fn start(args: &ChaosArgs, number: usize) -> io::Result<Self> {
+    /// Starts run `number`, knowing how long set-ups have lasted in those before it.
+    pub(crate) fn start(args: &ChaosArgs, number: usize, set_ups: SetUps) -> io::Result<Self> {
         let program = std::env::current_exe()?;
         let own = std::process::id();
         let name = format!("chaos-{own}-{number}");
@@ -147,7 +151,7 @@ impl Victim {
             armed: Vec::new(),
             stalled: Vec::new(),
             set_up_blows: 0,
-            set_up_ns: BTreeMap::new(),
+            set_ups,
             done_ns: None,
             dealt: Vec::new(),
             cleared: 0,
@@ -178,6 +182,12 @@ impl Victim {
             self.strike(plan);
             std::thread::sleep(PERIOD);
         }
+    }
+
+    /// How long set-ups last, as this run and those before it have shown. A blow that came too late,
+    /// since that was guessed too long, comes in time in one of the next runs.
+    pub(crate) fn set_ups(&self) -> SetUps {
+        self.set_ups.clone()
     }
 
     /// What it printed.
@@ -307,7 +317,7 @@ impl Victim {
 
     /// How long set-ups of a role last: what the newest did weighs an eighth.
     fn learn(&mut self, target: Target, lasted_ns: u64) {
-        let usual = self.set_up_ns.entry(target).or_insert(lasted_ns);
+        let usual = self.set_ups.entry(target).or_insert(lasted_ns);
         *usual = *usual - *usual / 8 + lasted_ns / 8;
     }
 
@@ -316,7 +326,7 @@ impl Victim {
             Target::Supervisor => 4 * FIRST_GUESS_NS,
             _ => FIRST_GUESS_NS,
         };
-        self.set_up_ns.get(&target).copied().unwrap_or(guess)
+        self.set_ups.get(&target).copied().unwrap_or(guess)
     }
 
     fn is_steady(&self) -> bool {
