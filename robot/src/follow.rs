@@ -29,7 +29,7 @@ const ACTIONS_AHEAD: usize = 8;
 pub(crate) struct Follower {
     look_again_ns: u64,
     started: bool,
-    /// The last actions granted and asked for, and their numbers: a schedule that comes into force
+    /// The last action granted and the last one asked for, and their numbers: a schedule that comes into force
     /// after they were granted may not list them any more.
     last: [Option<(u32, Action)>; 2],
     /// When that was asked for.
@@ -84,6 +84,7 @@ impl Follower {
                 if doing.grip != Grip::Keep {
                     self.ask_beyond(now, schedule, intent);
                 }
+                // What is asked for along with it is driven in the same tick.
                 (phase, Doing { go: true, ..doing })
             }
             Some(_) => (under_way(now, next, part), Doing::waiting(u64::MAX)),
@@ -122,8 +123,12 @@ impl Follower {
     }
 
     /// Asks, along with a grip, for what comes after it, so that no tick is lost: the world takes it
-    /// up as soon as the grip is made. What goes nowhere is granted at once, and so not asked for.
+    /// up as soon as the grip is made. What goes nowhere is asked for after it.
     fn ask_beyond(&mut self, now: &Now<'_>, schedule: &Schedule, intent: &mut Intent) {
+        if intent.asked.fate(now.me()) == Fate::Sent {
+            // Another request would take the place of one that may be granted by now.
+            return;
+        }
         let asked = intent.asked.request();
         let is_new = |request: &PathRequest| {
             let of = |request: &PathRequest| (request.actions, request.schedule_version);

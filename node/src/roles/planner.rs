@@ -133,7 +133,10 @@ impl Shell {
             self.tables.send(|out| out.copy_from(table))?;
         }
         if let (Some(schedules), Some(schedule)) = (&self.schedules, output.schedule) {
-            self.last.write(schedule)?;
+            if let Err(error) = self.last.write(schedule) {
+                // The next process plans anew then.
+                seat.note(error.to_string());
+            }
             schedules.send(|out| out.copy_from(schedule))?;
         }
         for answer in output.answers {

@@ -33,9 +33,10 @@ impl Anytime {
 
     /// Plans anew from where everything is, since what the plan assumes is no longer so.
     pub(crate) fn replan(&mut self, snapshot: Checked<WorldSnapshot>) {
+        let is_on_its_way = matches!(self.stage, Stage::Inherited | Stage::Stop);
         self.stage = match snapshot.header.schedule_version {
             // Nothing is followed, nor on its way.
-            0 if self.script.is_none() => Stage::New,
+            0 if self.script.is_none() && !is_on_its_way => Stage::New,
             _ => Stage::Stop,
         };
     }

@@ -12,18 +12,19 @@ use std::path::PathBuf;
 use shm_types::{Checked, Counts, Schedule, zeroed};
 use zerocopy::IntoBytes;
 
-use crate::domain;
-use crate::roles::RoleError;
+use crate::domain::{self, DomainError};
 
 /// Where it is kept.
 pub(super) struct LastSchedule {
     path: PathBuf,
+    /// Version of the newest one that this process has tried to write.
+    version: u32,
 }
 
 impl LastSchedule {
     /// In this file.
     pub(super) const fn new(path: PathBuf) -> Self {
-        Self { path }
+        Self { path, version: 0 }
     }
 
     /// The one that an earlier process has left; `None` if there is none, or what there is, is no
@@ -40,12 +41,16 @@ impl LastSchedule {
         Some(schedule)
     }
 
-    /// Writes `schedule` down in the place of the one before.
+    /// Writes `schedule` down in the place of the one before, once for each version.
     ///
     /// # Errors
     /// It cannot be written.
-    pub(super) fn write(&self, schedule: &Schedule) -> Result<(), RoleError> {
-        Ok(domain::put(&self.path, schedule.as_bytes())?)
+    pub(super) fn write(&mut self, schedule: &Schedule) -> Result<(), DomainError> {
+        if schedule.version == self.version {
+            return Ok(());
+        }
+        self.version = schedule.version;
+        domain::put(&self.path, schedule.as_bytes())
     }
 }
 
@@ -63,7 +68,7 @@ mod tests {
     #[test]
     fn what_was_written_last_is_read_and_nothing_that_is_no_schedule() {
         let directory = tempfile::tempdir().unwrap();
-        let last = LastSchedule::new(directory.path().join("schedule"));
+        let mut last = LastSchedule::new(directory.path().join("schedule"));
         assert!(last.read(COUNTS).is_none(), "nothing was written");
         let mut schedule: Box<Schedule> = zeroed();
         schedule.robot_count = 2;
@@ -73,6 +78,7 @@ mod tests {
             let read = last.read(COUNTS).unwrap();
             assert_eq!((read.version, read.robot_count), (version, 2));
         }
+        schedule.version = 5;
         schedule.robots[1] = RobotSchedule {
             count: 1,
             offset: u32::MAX,
