@@ -261,17 +261,13 @@ impl Planner {
         let in_force = header.schedule_version;
         let is_due = match &mut self.anytime {
             None => self.standing == Standing::Written && in_force == 0,
-            // One that was started again does not know what robots follow.
-            Some(anytime) if self.schedule_version < in_force => {
-                anytime.replan(snapshot);
-                let counters = &mut self.counters;
-                self.standing = anytime.advance(scene, snapshot, budget, counters, schedule);
-                self.standing == Standing::Written
-            }
-            Some(anytime) if self.schedule_version == in_force => {
-                if anytime.list_more(snapshot.robots(), schedule) {
-                    true
-                } else {
+            Some(anytime) if self.schedule_version <= in_force => {
+                // One that was started again may not know what robots follow.
+                let is_known = self.schedule_version == in_force;
+                if !is_known {
+                    anytime.replan(snapshot);
+                }
+                is_known && anytime.list_more(snapshot.robots(), schedule) || {
                     let counters = &mut self.counters;
                     self.standing = anytime.advance(scene, snapshot, budget, counters, schedule);
                     self.standing == Standing::Written
@@ -306,7 +302,6 @@ impl Planner {
             table: std::mem::replace(&mut self.table, zeroed()),
             schedule: self.schedule.take(),
             schedule_version: self.schedule_version,
-            repeats: self.repeats,
             versions_past: self.versions_past,
             scene_version: snapshot.header.scene_version,
             tick: self.tick,

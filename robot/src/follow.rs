@@ -187,9 +187,12 @@ impl Follower {
     pub(crate) fn hash_into(&self, hash: &mut StateHash) {
         hash.add(&[u64::from(self.started), self.asked_ns]);
         hash.add(&self.scene_version);
-        for (number, action) in self.last.iter().flatten() {
-            hash.add(number);
-            hash.add(action);
+        for last in &self.last {
+            hash.add(&u64::from(last.is_some()));
+            if let Some((number, action)) = last {
+                hash.add(number);
+                hash.add(action);
+            }
         }
     }
 }

@@ -245,6 +245,26 @@ fn what_is_asked_for_along_with_a_grip_is_repeated_until_the_schedule_changes() 
     assert_eq!((path.id, path.schedule_version), (asked.id + 1, 2));
 }
 
+/// The world may have granted it by then: another one would not go on from where that ends.
+#[test]
+fn while_what_was_asked_for_along_with_a_grip_is_on_its_way_nothing_else_is() {
+    let mut bench = Bench::new();
+    // The way aside waits for nobody, the way home for robot 1.
+    let plan = bench.schedule.as_deref_mut().unwrap();
+    (plan.actions[3].waits, plan.actions[4].waits) = (0, 1);
+    bench.hold(true);
+    bench.stand(GOAL, 3);
+    bench.step();
+    assert_eq!((bench.grip(), bench.asked()), (Grip::Release, (1, 4)));
+    let asked = bench.command.path.id;
+    bench.snapshot.robots[1].actions = 3;
+    bench.step();
+    assert_eq!((bench.command.path.id, bench.asked()), (asked, (1, 4)));
+    bench.snapshot.robots[0].acknowledged = bench.command.sequence;
+    bench.step();
+    assert_eq!((bench.command.path.id, bench.asked()), (asked + 1, (2, 5)));
+}
+
 #[test]
 fn a_process_started_in_the_middle_does_what_the_one_before_it_did() {
     let mut bench = Bench::new();

@@ -52,9 +52,9 @@ impl Terms {
 pub(crate) struct Change {
     /// In this tick the robot was where it was not known to be clear.
     pub(crate) strayed: bool,
-    /// Pieces of its grant from this one on are not known to be clear,
+    /// Number of the first piece of its grant that is not known to be clear.
     pub(crate) new_from: usize,
-    /// and this one from here on.
+    /// Where on that piece what is not known begins.
     pub(crate) start: Vec2,
 }
 
@@ -93,7 +93,7 @@ impl Cleared {
     }
 
     /// Compares where `robot` was in this tick, and what is granted to it, with the way. Whether
-    /// what is in its hand, and on the ground, is the same.
+    /// what is in its hand, on the ground, and waived for it is the same.
     #[inline]
     pub(crate) fn compare(&mut self, scene: &Scene, bodies: &Bodies, robot: &Robot) -> bool {
         let known = self

@@ -241,7 +241,7 @@ impl World {
         checks.add(Invariant::Object, robots, changed);
         checks.add(Invariant::Wall, robots, changed);
         checks.add(Invariant::Holding, holding, holding);
-        checks.add(Invariant::Lost, objects, objects);
+        checks.add(Invariant::Lost, objects, 0);
         checks.add(Invariant::Motion, robots, robots);
         checks.add(Invariant::Grants, pairs, changed_pairs);
     }
@@ -391,7 +391,11 @@ impl World {
             while unchecked != 0 {
                 let index = 64 * word + unchecked.trailing_zeros() as usize;
                 unchecked &= unchecked - 1;
-                if index < self.objects.len() && !self.is_sound(index) {
+                if index >= self.objects.len() {
+                    break;
+                }
+                self.counters.checks.add(Invariant::Lost, 0, 1);
+                if !self.is_sound(index) {
                     self.objects.touched().check_all();
                     return Some(Violation::Lost { object: id(index) });
                 }

@@ -270,6 +270,16 @@ mod tests {
     use crate::anytime::solver::Solver;
     use crate::anytime::solver::testing::{planned, planned_for};
 
+    fn varied(
+        scene: &Scene,
+        solver: &mut Solver,
+        near: (&Hops, &[Item]),
+        random: &mut ChaCha8Rng,
+    ) -> Option<(Hops, Vec<Item>)> {
+        let (ground, start) = (&mut solver.ground, &solver.start);
+        vary(scene, ground, start, &solver.homes, near, random)
+    }
+
     #[test]
     fn what_is_varied_still_leads_every_object_from_its_start_to_its_goal() {
         let mut is_longer = false;
@@ -283,13 +293,7 @@ mod tests {
             let (mut hops, mut order) = solver.current.clone().unwrap();
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             for _ in 0..20 {
-                let Solver {
-                    ground,
-                    start,
-                    homes,
-                    ..
-                } = &mut solver;
-                let varied = vary(&scene, ground, start, homes, (&hops, &order), &mut random);
+                let varied = varied(&scene, &mut solver, (&hops, &order), &mut random);
                 let Some((found, items)) = varied else {
                     continue;
                 };
@@ -339,6 +343,21 @@ mod tests {
     "#;
 
     #[test]
+    fn nothing_is_moved_as_it_cannot_be_held() {
+        let scene = scene::parse(AT_WALLS, "at-walls").unwrap();
+        let (mut solver, _) = planned_for(&scene);
+        let spec = &scene.objects[0];
+        let goal = Place::of(&scene, &solver.ground, 0, spec.goal.unwrap());
+        // Nobody has room below it where it starts, nor above it where it is to go.
+        for by in [0, 1] {
+            let sequence = [(0, goal.held(by))];
+            let (start, homes) = (&solver.start, &solver.homes);
+            let hops = Hops::new(&scene, &mut solver.ground, start, homes, &sequence);
+            assert!(hops.is_none(), "by grasp {by}");
+        }
+    }
+
+    #[test]
     fn an_object_is_set_aside_as_it_can_be_held_and_goes_on_so() {
         let scene = scene::parse(AT_WALLS, "at-walls").unwrap();
         let (mut solver, _) = planned_for(&scene);
@@ -346,13 +365,7 @@ mod tests {
         let mut is_clutter_moved = false;
         let mut random = ChaCha8Rng::seed_from_u64(1);
         for _ in 0..200 {
-            let Solver {
-                ground,
-                start,
-                homes,
-                ..
-            } = &mut solver;
-            let varied = vary(&scene, ground, start, homes, (&hops, &order), &mut random);
+            let varied = varied(&scene, &mut solver, (&hops, &order), &mut random);
             let Some((found, items)) = varied else {
                 continue;
             };
