@@ -170,6 +170,13 @@ impl Ground {
         &self.masks[kept * self.classes + there]
     }
 
+    /// The cells that a body of class `there` at a cell keeps one of class `kept` away from.
+    pub(crate) fn kept_away(&self, kept: usize, there: usize, cell: u32) -> Vec<u32> {
+        let at = self.xy(cell);
+        let offsets = &self.mask(kept, there).all;
+        (offsets.iter().filter_map(|&offset| self.moved(at, offset))).collect()
+    }
+
     /// Where a cell is, m.
     pub(crate) fn at(&self, cell: u32) -> Vec2 {
         self.lattice.at(cell)

@@ -28,7 +28,7 @@ const UNITS_PER_ORDER: u64 = 4;
 /// Comparing a move with another one, in work units.
 const UNITS_PER_PAIR: usize = 4;
 /// How often in a row nothing may be left to try near the best order until that counts as all.
-const MOST_MISSES: u32 = 30;
+const MOST_MISSES: u32 = 300;
 
 impl Solver {
     /// Tries one more order. False if nothing near the best one is left to try.
@@ -81,7 +81,7 @@ impl Solver {
                 continue;
             };
             let is_better = chosen.as_ref().is_none_or(|(known, _)| least < *known);
-            if least < best && is_better && !self.tried.contains(&near) {
+            if least < best && is_better && !self.is_hopeless(&hops, &near) {
                 chosen = Some((least, near));
             }
         }
@@ -103,7 +103,7 @@ impl Solver {
             }
             if let Some(least) = hops.least(&near)
                 && (least <= known || step < WANDERING)
-                && !self.tried.contains(&near)
+                && !self.is_hopeless(&hops, &near)
             {
                 (found, known) = (near, least);
             }
@@ -130,8 +130,13 @@ impl Solver {
             (hops, order),
             &mut self.random,
         )?;
-        let promises = hops.least(&order)? < best;
+        let promises = hops.least(&order)? < best && !self.cuts.forbid(&hops, &order);
         promises.then(|| (Rc::new(hops), order))
+    }
+
+    /// Whether an order was tried before, or is known to lead nowhere.
+    fn is_hopeless(&self, hops: &Hops, order: &[Item]) -> bool {
+        self.tried.contains(order) || self.cuts.forbid(hops, order)
     }
 
     /// Pays for looking at so many orders.
@@ -168,7 +173,7 @@ mod tests {
             let (scene, mut solver, _) = planned(&options);
             let bounds = Bounds::of(&scene, BoundLimits::default()).unwrap();
             let r_s = bounds.r_s().unwrap();
-            for _ in 0..200 {
+            for _ in 0..600 {
                 solver.improve(&scene);
             }
             let found = solver.best.as_ref().unwrap().makespan;

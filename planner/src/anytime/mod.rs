@@ -14,6 +14,7 @@
 
 mod anew;
 mod asides;
+mod cuts;
 mod distances;
 mod greedy;
 mod ground;

@@ -28,6 +28,8 @@ pub(crate) type Item = (u32, u32);
 #[derive(Clone, Debug)]
 pub(crate) struct Hop {
     pub(crate) object: usize,
+    /// Class of the robot with the object.
+    pub(crate) class: usize,
     pub(crate) from: Rc<Place>,
     pub(crate) to: Rc<Place>,
 }
@@ -38,8 +40,13 @@ pub(crate) struct Hops {
     pub(crate) list: Vec<Hop>,
     /// By object: its first move in the list, and the end of its moves.
     pub(crate) of: Vec<(usize, usize)>,
+    /// By object, where it stands before its moves.
+    rests: Vec<Rc<Place>>,
     /// By robot: when it is free, and where; nowhere if it is gone.
     free: Vec<(Time, Option<u32>)>,
+    /// By robot: the object in whose room it is then.
+    left: Vec<Option<usize>>,
+    homes: Vec<u32>,
     /// By move: to its grasp.
     to_grasp: Vec<Field>,
     /// By robot: to its home.
@@ -69,6 +76,7 @@ impl Hops {
             for (_, to) in sequence.iter().filter(|(moved, _)| *moved == object) {
                 list.push(Hop {
                     object,
+                    class: ground.carrying(object, to.by),
                     from: from.held(to.by),
                     to: Rc::clone(to),
                 });
@@ -85,7 +93,7 @@ impl Hops {
         let mut to_grasp = Vec::new();
         for hop in &list {
             to_grasp.push(ground.field(alone, hop.from.grasp));
-            let field = ground.field(ground.carrying(hop.object, hop.to.by), hop.to.grasp);
+            let field = ground.field(hop.class, hop.to.grasp);
             let way = exact(&field, hop.from.grasp);
             transfer.push(way.saturating_add(ground.grasp + ground.release));
         }
@@ -93,9 +101,15 @@ impl Hops {
             .iter()
             .map(|&home| ground.field(alone, home))
             .collect();
-        let free = (start.robots.iter())
+        let free: Vec<(Time, Option<u32>)> = (start.robots.iter())
             .map(|track| (track.free.1, (!track.is_gone).then_some(track.free.0)))
             .collect();
+        let in_room_of = |cell| {
+            rests
+                .iter()
+                .position(|rest| rest.place.has_in_its_room(cell))
+        };
+        let left = free.iter().map(|&(_, at)| in_room_of(at?)).collect();
         let mut before = precedence(scene, ground, &list, &of, homes, &rests);
         for order in &scene.before {
             let hop = |(object, event): (usize, Event)| {
@@ -118,12 +132,24 @@ impl Hops {
         Some(Self {
             list,
             of,
+            rests: rests.into_iter().map(|rest| rest.place).collect(),
             free,
+            left,
+            homes: homes.to_vec(),
             to_grasp,
             to_home,
             transfer,
             before,
         })
+    }
+
+    pub(crate) const fn robots(&self) -> usize {
+        self.homes.len()
+    }
+
+    /// The lattice point of a robot's home.
+    pub(crate) fn home_of(&self, robot: usize) -> u32 {
+        self.homes[robot]
     }
 
     /// From where a robot is free to the grasp of a move.
@@ -214,27 +240,83 @@ impl Hops {
     }
 }
 
-/// How far an order has come that is made move by move, with the walls alone.
-pub(crate) struct Clocks {
+/// Which moves of an order have been made.
+pub(crate) struct Progress {
     /// By object: its next move.
     next: Vec<usize>,
+    /// By robot: its last move.
+    last: Vec<Option<usize>>,
+}
+
+impl Progress {
+    pub(crate) fn new(hops: &Hops) -> Self {
+        Self {
+            next: hops.of.iter().map(|&(first, _)| first).collect(),
+            last: vec![None; hops.free.len()],
+        }
+    }
+
+    /// The number of an object's next move.
+    pub(crate) fn next(&self, object: usize) -> usize {
+        self.next[object]
+    }
+
+    /// Takes note that a robot makes the next move of an object.
+    pub(crate) fn make(&mut self, (object, robot): Item) {
+        let next = &mut self.next[object as usize];
+        self.last[robot as usize] = Some(*next);
+        *next += 1;
+    }
+
+    /// Where an object stands.
+    pub(crate) fn place<'a>(&self, hops: &'a Hops, object: usize) -> &'a Rc<Place> {
+        let (next, first) = (self.next[object], hops.of[object].0);
+        if next == first {
+            &hops.rests[object]
+        } else {
+            &hops.list[next - 1].to
+        }
+    }
+
+    /// Where a robot begins its next move, and the object in whose room that may be; nowhere if it
+    /// is gone.
+    pub(crate) fn begins(&self, hops: &Hops, robot: usize) -> Option<(u32, Option<usize>)> {
+        match self.last[robot] {
+            None => hops.free[robot].1.map(|cell| (cell, hops.left[robot])),
+            Some(last) => {
+                let hop = &hops.list[last];
+                Some((hop.to.grasp, Some(hop.object)))
+            }
+        }
+    }
+
+    /// Where a robot is that has made no move.
+    pub(crate) fn unmoved(&self, hops: &Hops, robot: usize) -> Option<u32> {
+        let is_moved = self.last[robot].is_some();
+        hops.free[robot].1.filter(|_| !is_moved)
+    }
+}
+
+/// How far an order has come that is made move by move, with the walls alone.
+pub(crate) struct Clocks {
+    progress: Progress,
     done: Vec<bool>,
-    /// By robot: how long it is busy, and its last move.
-    busy: Vec<(Time, Option<usize>)>,
+    /// By robot: how long it is busy.
+    busy: Vec<Time>,
 }
 
 impl Clocks {
     pub(crate) fn new(hops: &Hops) -> Self {
         Self {
-            next: hops.of.iter().map(|&(first, _)| first).collect(),
+            progress: Progress::new(hops),
             done: vec![false; hops.list.len()],
-            busy: hops.free.iter().map(|&(time, _)| (time, None)).collect(),
+            busy: hops.free.iter().map(|&(time, _)| time).collect(),
         }
     }
 
     /// Whether something has to come before the next move of an object that has not.
     pub(crate) fn is_early(&self, hops: &Hops, object: usize) -> bool {
-        let before = &hops.before[self.next[object]];
+        let before = &hops.before[self.progress.next(object)];
         before.iter().any(|&before| !self.done[before])
     }
 
@@ -256,7 +338,7 @@ impl Clocks {
         robot: usize,
         far: impl Fn(&Distances, u32) -> Time + Copy,
     ) -> Time {
-        let hop = self.next[object];
+        let hop = self.progress.next(object);
         let done = self.released_by(hops, hop, robot, far);
         done.saturating_add(hops.back(hop, robot, far))
     }
@@ -268,8 +350,8 @@ impl Clocks {
         robot: usize,
         far: impl Fn(&Distances, u32) -> Time,
     ) -> Time {
-        let (busy, last) = self.busy[robot];
-        let way = match last {
+        let busy = self.busy[robot];
+        let way = match self.progress.last[robot] {
             None => hops.approach(robot, hop, far),
             Some(before) => hops.between(before, hop, far),
         };
@@ -278,10 +360,10 @@ impl Clocks {
 
     /// Takes note that a robot makes the next move of an object.
     pub(crate) fn make(&mut self, hops: &Hops, object: usize, robot: usize) {
-        let hop = self.next[object];
-        self.busy[robot] = (self.released_by(hops, hop, robot, exact), Some(hop));
+        let hop = self.progress.next(object);
+        self.busy[robot] = self.released_by(hops, hop, robot, exact);
         self.done[hop] = true;
-        self.next[object] += 1;
+        self.progress.make((object as u32, robot as u32));
     }
 }
 
@@ -327,7 +409,7 @@ fn precedence(
         let concerned: Vec<usize> = (0..list.len())
             .filter(|&number| {
                 let hop = &list[number];
-                alone || ground.carrying(hop.object, hop.to.by) == class
+                alone || hop.class == class
             })
             .filter(|&number| !hinders(&pieces, &list[number]))
             .collect();

@@ -20,6 +20,7 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use scene::{ROBOT_ALONE, Scene, Settings};
 
+use crate::anytime::cuts::Cuts;
 use crate::anytime::greedy::Offers;
 use crate::anytime::ground::{EVER, Ground, Time};
 use crate::anytime::joint::Joint;
@@ -118,6 +119,8 @@ pub(crate) struct Solver {
     /// Ways of the moves of orders tried before, from the present start and as `mode` says.
     known: Known,
     mode: Mode,
+    /// Why moves had no way.
+    pub(super) cuts: Cuts,
     /// Whether the plan begins where the scene does.
     pub(crate) is_start: bool,
     /// Whether some robot is gone.
@@ -182,6 +185,7 @@ impl Solver {
             decoded: 0,
             weighing: 0,
             known: Known::default(),
+            cuts: Cuts::default(),
             mode: MODES[0],
             is_start: situation.is_start,
             is_short: situation.is_short(),
@@ -357,6 +361,8 @@ impl Solver {
         let home_by = hops.home_by(order, limit);
         for (place, &item) in order.iter().enumerate() {
             if !self.commit(scene, hops, &order[..place], item, home_by[place]) {
+                let (ground, sequencer) = (&self.ground, &mut self.sequencer);
+                (self.cuts).learn(ground, sequencer, hops, &order[..place], item);
                 return None;
             }
         }

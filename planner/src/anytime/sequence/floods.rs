@@ -80,6 +80,35 @@ impl Sequencer {
         false
     }
 
+    /// The same, with these cells blocked and no others.
+    pub(crate) fn finds_among<'a>(
+        &mut self,
+        ground: &Ground,
+        class: usize,
+        (from, to): (u32, u32),
+        blocked: impl Iterator<Item = &'a [u32]>,
+    ) -> bool {
+        self.round += 1;
+        self.met = (from, to);
+        blocked.for_each(|cells| self.block_cells(cells));
+        self.finds(ground, class, from, to)
+    }
+
+    /// Whether what was reached in this round, or an end of the way, is beside or among these
+    /// cells.
+    pub(crate) fn has_met(&self, ground: &Ground, cells: &[u32]) -> bool {
+        let is_seen = |cell: u32| {
+            self.seen
+                .get(cell as usize)
+                .is_some_and(|&seen| seen >= self.mark(0))
+        };
+        cells.iter().any(|&cell| {
+            let mut beside =
+                (0..4).map(|direction| cell.wrapping_add_signed(ground.offsets[direction]));
+            cell == self.met.0 || cell == self.met.1 || beside.any(is_seen)
+        })
+    }
+
     /// The cells of the way that was just found.
     pub(super) fn found(&self, cells: &mut Vec<u32>) {
         for mut cell in [self.met.0, self.met.1] {

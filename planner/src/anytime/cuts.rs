@@ -1,0 +1,268 @@
+//! What is learned from moves that could not be made: cuts (rule 35).
+//!
+//! Responsible for: why a move had no way, as a smallest set of bodies that close it; which orders
+//! come to the same again.
+//! Not responsible for: what one object closes where it starts or ends (`order`), time (`plan`).
+//!
+//! How: a move that finds no way in space and time is looked at without time, among bodies as they
+//! stand after all moves before it in the order. If there is no way either, bodies are left out one
+//! by one as long as there is none. What remains is the cut. Only failures are looked at, so no
+//! order pays for what it does not need.
+//!
+//! A cut is a hypothesis: a robot might pass before a body comes to where it stands then. An order
+//! in which that robot's move comes first says so better.
+
+use std::borrow::Cow;
+use std::collections::HashMap;
+
+use scene::{ROBOT_ALONE, Vec2};
+
+use crate::anytime::ground::Ground;
+use crate::anytime::order::{Hops, Item, Progress};
+use crate::anytime::sequence::Sequencer;
+
+/// A way that a move needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct Leg {
+    class: usize,
+    from: u32,
+    to: u32,
+    /// The object that is moved, and the one in whose room the way begins: they close nothing but
+    /// what is said apart.
+    own: [Option<usize>; 2],
+}
+
+/// Somebody who stays where it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Body {
+    /// An object, by where its centre is, m.
+    Object(usize, Vec2),
+    /// A robot that has made no move, by its lattice point.
+    Robot(usize, u32),
+}
+
+/// A body, and the lattice points that it closes to a leg.
+type Closing<'a> = (Body, Cow<'a, [u32]>);
+
+/// What was learned.
+#[derive(Default)]
+pub(crate) struct Cuts {
+    /// By leg: bodies that close it together, none of which can be left out.
+    by_leg: HashMap<Leg, Vec<Vec<Body>>>,
+}
+
+impl Cuts {
+    /// Whether an order comes to a move that is known to have no way.
+    pub(crate) fn forbid(&self, hops: &Hops, order: &[Item]) -> bool {
+        if self.by_leg.is_empty() {
+            return false;
+        }
+        let mut progress = Progress::new(hops);
+        order.iter().any(|&item| {
+            let is_cut = self.forbid_next(hops, &progress, item);
+            progress.make(item);
+            is_cut
+        })
+    }
+
+    fn forbid_next(&self, hops: &Hops, progress: &Progress, item: Item) -> bool {
+        let stands = |body: &Body| match *body {
+            Body::Object(object, at) => progress.place(hops, object).at == at,
+            Body::Robot(robot, cell) => {
+                robot != item.1 as usize && progress.unmoved(hops, robot) == Some(cell)
+            }
+        };
+        legs(hops, progress, item).into_iter().flatten().any(|leg| {
+            let cuts = self.by_leg.get(&leg.0);
+            cuts.is_some_and(|cuts| cuts.iter().any(|cut| cut.iter().all(stands)))
+        })
+    }
+
+    /// Learns why the move that comes after an order has no way, if bodies as they stand then say
+    /// so.
+    pub(crate) fn learn(
+        &mut self,
+        ground: &Ground,
+        sequencer: &mut Sequencer,
+        hops: &Hops,
+        order: &[Item],
+        item: Item,
+    ) {
+        let mut progress = Progress::new(hops);
+        order.iter().for_each(|&made| progress.make(made));
+        for (leg, own) in legs(hops, &progress, item).into_iter().flatten() {
+            let mut bodies = standing(ground, hops, &progress, leg, item.1 as usize);
+            if leg.is_open(ground, sequencer, own, &bodies) {
+                continue;
+            }
+            // Whoever is not beside what was reached from the end that is shut in is not needed.
+            bodies.retain(|(_, cells)| sequencer.has_met(ground, cells));
+            let mut needed = 0;
+            while needed < bodies.len() {
+                let body = bodies.remove(needed);
+                if leg.is_open(ground, sequencer, own, &bodies) {
+                    bodies.insert(needed, body);
+                    needed += 1;
+                }
+            }
+            let cut = bodies.into_iter().map(|(body, _)| body).collect();
+            let known: &mut Vec<Vec<Body>> = self.by_leg.entry(leg).or_default();
+            if !known.contains(&cut) {
+                known.push(cut);
+            }
+        }
+    }
+}
+
+impl Leg {
+    /// Whether there is a way among bodies, and what its own object closes.
+    fn is_open(
+        self,
+        ground: &Ground,
+        sequencer: &mut Sequencer,
+        own: &[u32],
+        bodies: &[Closing<'_>],
+    ) -> bool {
+        let closed = bodies.iter().map(|(_, cells)| &**cells).chain([own]);
+        sequencer.finds_among(ground, self.class, (self.from, self.to), closed)
+    }
+}
+
+/// Who stands still while a robot is on its way.
+fn standing<'a>(
+    ground: &Ground,
+    hops: &'a Hops,
+    progress: &Progress,
+    leg: Leg,
+    mover: usize,
+) -> Vec<Closing<'a>> {
+    let objects = (0..hops.of.len())
+        .filter(|&object| !leg.own.contains(&Some(object)))
+        .map(|object| {
+            let place = progress.place(hops, object);
+            let cells = Cow::from(&place.cells[leg.class]);
+            (Body::Object(object, place.at), cells)
+        });
+    let robots = (0..hops.robots())
+        .filter(|&robot| robot != mover)
+        .filter_map(|robot| {
+            let cell = progress.unmoved(hops, robot)?;
+            let cells = ground.kept_away(leg.class, ROBOT_ALONE.0, cell);
+            Some((Body::Robot(robot, cell), cells.into()))
+        });
+    objects.chain(robots).collect()
+}
+
+/// Approach, transfer and way home of a move, and what its own object closes to each; none if its
+/// robot is gone.
+fn legs<'a>(
+    hops: &'a Hops,
+    progress: &Progress,
+    (object, robot): Item,
+) -> Option<[(Leg, &'a [u32]); 3]> {
+    let (object, robot) = (object as usize, robot as usize);
+    let hop = &hops.list[progress.next(object)];
+    let (begin, left) = progress.begins(hops, robot)?;
+    let leg = |class, from, to, left| Leg {
+        class,
+        from,
+        to,
+        own: [Some(object), left],
+    };
+    let (alone, home) = (ROBOT_ALONE.0, hops.home_of(robot));
+    let approach = leg(alone, begin, hop.from.grasp, left);
+    let transfer = leg(hop.class, hop.from.grasp, hop.to.grasp, None);
+    let back = leg(alone, hop.to.grasp, home, None);
+    Some([
+        (approach, &hop.from.bare),
+        (transfer, &[]),
+        (back, &hop.to.bare),
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::RngExt;
+    use rand::seq::SliceRandom;
+    use scene::GenerateOptions;
+
+    use super::*;
+    use crate::anytime::ground::EVER;
+    use crate::anytime::solver::Solver;
+    use crate::anytime::solver::testing::{cells, planned, planned_for};
+
+    /// Carries an order out; whether it can be, and whether that was foreseen.
+    fn tried(scene: &scene::Scene, solver: &mut Solver, order: &[Item]) -> (bool, bool) {
+        let (hops, _) = solver.current.clone().unwrap();
+        let is_foreseen = solver.cuts.forbid(&hops, order);
+        (
+            solver.decode(scene, &hops, order, EVER).is_some(),
+            is_foreseen,
+        )
+    }
+
+    #[test]
+    fn objects_that_close_both_ways_together_are_learned_and_it_is_enough_that_one_of_them_goes() {
+        let scene = cells(&[
+            "##2#####", //
+            "#.b...##", //
+            "#a###1##", //
+            "#A.c..d4", //
+            "###3####",
+        ]);
+        let (mut solver, _) = planned_for(&scene);
+        let all = [(0, 0), (1, 0), (2, 0), (3, 0)];
+        assert_eq!(tried(&scene, &mut solver, &all), (false, false));
+        assert_eq!(tried(&scene, &mut solver, &all), (false, true));
+        let cuts: Vec<_> = solver.cuts.by_leg.values().flatten().collect();
+        let objects = scene.objects.iter().map(|object| object.start);
+        let at: Vec<Vec2> = objects.collect();
+        let both = vec![Body::Object(1, at[1]), Body::Object(2, at[2])];
+        assert_eq!(cuts, [&both], "the object that hinders nobody is left out");
+        // It is the same later, whoever has moved that has nothing to do with it.
+        assert_eq!(tried(&scene, &mut solver, &[(3, 0), (0, 0)]), (false, true));
+        for first in [1, 2] {
+            assert_eq!(
+                tried(&scene, &mut solver, &[(first, 0), (0, 0)]),
+                (true, false)
+            );
+        }
+    }
+
+    #[test]
+    fn a_robot_that_has_not_moved_closes_the_way_of_others_but_not_its_own() {
+        let scene = cells(&["AaB1"]);
+        let (mut solver, _) = planned_for(&scene);
+        assert_eq!(tried(&scene, &mut solver, &[(0, 0)]), (false, false));
+        assert_eq!(tried(&scene, &mut solver, &[(0, 0)]), (false, true));
+        assert_eq!(tried(&scene, &mut solver, &[(0, 1)]), (true, false));
+    }
+
+    #[test]
+    fn what_is_foreseen_of_a_single_robot_comes_true() {
+        let (mut foreseen, mut failed) = (0, 0);
+        for seed in 0..12 {
+            let options = GenerateOptions {
+                seed,
+                robots: 1,
+                objects: 8,
+                area_m2: 30.0,
+                ..GenerateOptions::default()
+            };
+            let (scene, mut solver, _) = planned(&options);
+            let (_, mut order) = solver.current.clone().unwrap();
+            for _ in 0..100 {
+                order.shuffle(&mut solver.random);
+                let items = solver.random.random_range(1..=order.len());
+                let (is_possible, is_foreseen) = tried(&scene, &mut solver, &order[..items]);
+                assert!(!(is_possible && is_foreseen), "seed {seed}: {order:?}");
+                foreseen += usize::from(is_foreseen);
+                failed += usize::from(!is_possible);
+            }
+        }
+        assert!(
+            2 * foreseen > failed,
+            "{foreseen} of {failed} were foreseen"
+        );
+    }
+}
