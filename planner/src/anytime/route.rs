@@ -1,5 +1,5 @@
-//! The quickest way of one robot through what others have reserved: safe-interval path planning
-//! over the legs of a task.
+//! A quick way of one robot through what others have reserved: safe-interval path planning over the
+//! legs of a task.
 //!
 //! Responsible for: one search over several legs, grips between them included.
 //! Not responsible for: reserving what was found (`plan`).
@@ -8,7 +8,10 @@
 //! opens, and the next leg goes on as another class. The last leg ends where the robot may stay for
 //! ever.
 //! Source: Phillips and Likhachev, "SIPP", ICRA 2011; the legs are layers of one search, so that a
-//! grasp is never made at a time from which there is no way on.
+//! grasp is never made at a time from which there is no way on. What is ahead counts a quarter more
+//! than it takes at least (weighted A*, Pohl 1970): a way takes at most a quarter more than the
+//! quickest, and in practice no more, but whoever has to wait or go round does not look at all that
+//! is as quick so far.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -96,7 +99,7 @@ pub(crate) struct Router {
     closed: Vec<u32>,
     round: u32,
     points: usize,
-    /// Nodes to expand, the one with the least sum first, then the latest.
+    /// Nodes to expand, the one that promises most first, then the latest.
     open: BinaryHeap<Reverse<(u64, u32)>>,
     /// Lower bound of what follows each leg.
     rest: Vec<Time>,
@@ -121,7 +124,8 @@ impl Router {
         }
     }
 
-    /// The quickest way, or none. Its pieces are written to `way`.
+    /// When the robot is there the way that was found, or none if there is no way. Its pieces are
+    /// written to `way`.
     pub(crate) fn find(
         &mut self,
         ground: &Ground,
@@ -224,8 +228,8 @@ impl Router {
         let Some(ahead) = leg.ahead(node.cell) else {
             return;
         };
-        let key = node.time + ahead + self.rest[node.leg as usize];
-        if key >= quest.limit {
+        let ahead = ahead + self.rest[node.leg as usize];
+        if node.time + ahead >= quest.limit {
             return;
         }
         let slot = node.leg as usize * self.points + node.cell as usize;
@@ -246,6 +250,7 @@ impl Router {
                 index
             }
         };
+        let key = node.time.saturating_add(ahead + ahead / 4);
         let key = u64::from(key) << 32 | u64::from(!node.time);
         self.open.push(Reverse((key, index)));
     }
