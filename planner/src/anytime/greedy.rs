@@ -6,7 +6,8 @@
 //! Not responsible for: whether a move can be made among all others (`plan`).
 //!
 //! How: an offer counts with the least time that it can take until its turn comes. Only then the
-//! ways are looked for, so that most are never looked for.
+//! ways are looked for, so that most are never looked for. Each robot has a heap of its own, which is
+//! made anew when the robot has got a move.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -23,8 +24,6 @@ struct Offer {
     place: u32,
     robot: u32,
     is_exact: bool,
-    /// How many moves the robot had made then.
-    moves: u32,
 }
 
 /// The moves of a sequence that are left to make.
@@ -37,9 +36,10 @@ pub(crate) struct Offers<'a> {
     clocks: Clocks,
     /// By place: whether it is made.
     made: Vec<bool>,
-    /// By robot: how many it makes.
-    moves: Vec<u32>,
-    waiting: BinaryHeap<Reverse<Offer>>,
+    /// By robot.
+    waiting: Vec<BinaryHeap<Reverse<Offer>>>,
+    /// The soonest of each of these, and some that are so no longer.
+    soonest: BinaryHeap<Reverse<Offer>>,
 }
 
 impl<'a> Offers<'a> {
@@ -50,8 +50,8 @@ impl<'a> Offers<'a> {
             in_turn,
             clocks: Clocks::new(hops),
             made: vec![false; sequence.len()],
-            moves: vec![0; robots],
-            waiting: BinaryHeap::new(),
+            waiting: vec![BinaryHeap::new(); robots],
+            soonest: BinaryHeap::new(),
         };
         for place in offers.open() {
             offers.offer_to_all(place);
@@ -63,27 +63,47 @@ impl<'a> Offers<'a> {
     pub(crate) fn take_soonest(&mut self, commits: &mut impl FnMut(Item) -> bool) -> Option<Item> {
         let mut refused = Vec::new();
         let taken = loop {
-            let Reverse(mut offer) = self.waiting.pop()?;
+            let mut offer = self.pop_soonest()?;
             let (place, robot) = (offer.place as usize, offer.robot as usize);
-            if self.made[place] || offer.moves != self.moves[robot] {
+            if self.made[place] {
                 continue;
             }
             let object = self.sequence[place];
             if self.clocks.is_early(self.hops, object as usize) {
-                refused.push(Reverse(offer));
+                refused.push(offer);
             } else if !offer.is_exact {
                 offer.home_by = self.clocks.home_by(self.hops, object as usize, robot);
                 offer.is_exact = true;
-                self.waiting
-                    .extend((offer.home_by < EVER).then_some(Reverse(offer)));
+                self.wait(offer);
             } else if commits((object, offer.robot)) {
                 break offer;
             } else {
-                refused.push(Reverse(offer));
+                refused.push(offer);
             }
         };
-        self.waiting.extend(refused);
+        refused.into_iter().for_each(|offer| self.wait(offer));
         Some(self.make(taken))
+    }
+
+    fn pop_soonest(&mut self) -> Option<Offer> {
+        loop {
+            let soonest = self.soonest.pop()?;
+            let waiting = &mut self.waiting[soonest.0.robot as usize];
+            if waiting.peek() == Some(&soonest) {
+                waiting.pop();
+                self.soonest.extend(waiting.peek().copied());
+                return Some(soonest.0);
+            }
+        }
+    }
+
+    fn wait(&mut self, offer: Offer) {
+        let (robot, offer) = (offer.robot as usize, Reverse(offer));
+        if offer.0.home_by < EVER {
+            self.waiting[robot].push(offer);
+            let is_soonest = self.waiting[robot].peek() == Some(&offer);
+            self.soonest.extend(is_soonest.then_some(offer));
+        }
     }
 
     /// The places of moves that may be next: the first of each object that is left.
@@ -102,35 +122,32 @@ impl<'a> Offers<'a> {
         let object = self.sequence[place];
         self.clocks.make(self.hops, object as usize, robot);
         self.made[place] = true;
-        self.moves[robot] += 1;
-        for open in self.open() {
-            // Others have not changed for the other robots.
+        let open = self.open();
+        // Others have not changed for the other robots.
+        for &open in &open {
             if self.in_turn || self.sequence[open] == object {
                 self.offer_to_all(open);
-            } else {
-                self.offer(open, robot);
             }
         }
+        let offers = open.iter().map(|&open| Reverse(self.offer(open, robot)));
+        self.waiting[robot] = offers.filter(|offer| offer.0.home_by < EVER).collect();
+        self.soonest.extend(self.waiting[robot].peek().copied());
         (object, offer.robot)
     }
 
     fn offer_to_all(&mut self, place: usize) {
-        for robot in 0..self.moves.len() {
-            self.offer(place, robot);
+        for robot in 0..self.waiting.len() {
+            self.wait(self.offer(place, robot));
         }
     }
 
-    fn offer(&mut self, place: usize, robot: usize) {
+    fn offer(&self, place: usize, robot: usize) -> Offer {
         let object = self.sequence[place] as usize;
-        let home_by = self.clocks.home_by_at_least(self.hops, object, robot);
-        let offer = Offer {
-            home_by,
+        Offer {
+            home_by: self.clocks.home_by_at_least(self.hops, object, robot),
             place: place as u32,
             robot: robot as u32,
             is_exact: false,
-            moves: self.moves[robot],
-        };
-        self.waiting
-            .extend((home_by < EVER).then_some(Reverse(offer)));
+        }
     }
 }

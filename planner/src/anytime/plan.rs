@@ -298,7 +298,7 @@ impl Plan {
             }
             let mut class = ROBOT_ALONE.0;
             let mut cell = track.start;
-            let meets = |class: usize, cell: u32| place.cells[class].binary_search(&cell).is_ok();
+            let meets = |class: usize, cell: u32| place.closes(class, cell);
             let mut was_in = meets(class, cell);
             for deed in &track.deeds {
                 let mut beside = None;

@@ -123,9 +123,17 @@ impl Place {
         self.open_by().is_some()
     }
 
+    /// Whether it keeps a class of bodies away from a cell.
+    #[inline]
+    pub(crate) fn closes(&self, class: usize, cell: u32) -> bool {
+        let closed = &self.cells[class];
+        let is_near = closed.first() <= Some(&cell) && Some(&cell) <= closed.last();
+        is_near && closed.binary_search(&cell).is_ok()
+    }
+
     /// Whether a robot without an object that is at this cell is in its room.
     pub(crate) fn has_in_its_room(&self, cell: u32) -> bool {
-        self.cells[ROBOT_ALONE.0].binary_search(&cell).is_ok()
+        self.closes(ROBOT_ALONE.0, cell)
     }
 
     /// Where robots can stand that grasp it.
