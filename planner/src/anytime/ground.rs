@@ -51,6 +51,9 @@ pub(crate) struct Mask {
     half: i32,
 }
 
+/// Distances that are kept although nobody asks for them any more, 4 bytes each.
+const MOST_DISTANCES_KEPT: usize = 1 << 24;
+
 /// Distances to one place, walls only.
 pub(crate) type Field = Rc<Distances>;
 
@@ -66,6 +69,8 @@ pub(crate) struct Ground {
     /// By class that is kept away, then class that is there.
     masks: Vec<Mask>,
     fields: HashMap<(usize, u32), Field>,
+    /// So many of these are kept, even if nobody asks for them any more.
+    most_fields: usize,
     pub(crate) offsets: [i32; 8],
     /// Class of a robot that carries each object.
     carrying: Vec<Vec<usize>>,
@@ -131,6 +136,7 @@ impl Ground {
             obstacles,
             masks,
             fields: HashMap::new(),
+            most_fields: 0,
             second_per_unit,
             grasp: units(scene.robot.grasp_ns),
             release: units(scene.robot.release_ns),
@@ -264,8 +270,13 @@ impl Ground {
         near.min_by(|a, b| far(a).total_cmp(&far(b)))
     }
 
-    /// Distances to `to` for a class of bodies, walls only; each is worked out once.
+    /// Distances to `to` for a class of bodies, walls only; each is worked out once, unless there
+    /// are too many of them.
     pub(crate) fn field(&mut self, class: usize, to: u32) -> Field {
+        if self.fields.len() > self.most_fields {
+            self.fields.retain(|_, field| Rc::strong_count(field) > 1);
+            self.most_fields = (2 * self.fields.len()).max(MOST_DISTANCES_KEPT / self.points());
+        }
         let field = self.fields.entry((class, to)).or_insert_with(|| {
             let walls = Rc::clone(&self.walls[class]);
             Rc::new(Distances::new(walls, to, Rc::clone(&self.flooded)))

@@ -53,3 +53,18 @@ fn beside_a_diagonal_step_are_the_ends_of_the_two_straight_ones_it_is_made_of() 
         assert_eq!(sides(&ground, middle, direction), expected);
     }
 }
+
+#[test]
+fn distances_that_nobody_asks_for_any_more_are_forgotten_and_those_in_use_are_not() {
+    let scene = scene::generate(&scene::GenerateOptions::default())
+        .unwrap()
+        .scene;
+    let mut ground = Ground::new(&scene, &Settings::default(), Vec::new());
+    let most = MOST_DISTANCES_KEPT / ground.points();
+    let held = ground.field(0, 0);
+    for to in 1..2 * most as u32 {
+        ground.field(0, to);
+        assert!(ground.fields.len() <= most + 1);
+    }
+    assert!(Rc::ptr_eq(&held, &ground.field(0, 0)));
+}
