@@ -34,7 +34,7 @@ pub(crate) struct Participant {
 /// What a process has done so far, as the kernel tells.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Life {
-    /// Processor time, ns.
+    /// Processor time of its main thread, ns.
     pub(crate) used_ns: u64,
 }
 
@@ -205,7 +205,12 @@ mod tests {
 
     #[test]
     fn a_process_that_works_is_told_from_one_that_does_not() {
-        let own = || Life::of(std::process::id()).unwrap().used_ns;
+        // That of this thread: the test's main thread may do nothing at all.
+        let thread = rustix::thread::gettid()
+            .as_raw_nonzero()
+            .get()
+            .cast_unsigned();
+        let own = || Life::of(thread).unwrap().used_ns;
         let before = own();
         while own() == before {
             std::hint::black_box((0..10_000).sum::<u64>());
