@@ -42,7 +42,7 @@ impl Intent {
     /// Goes on from what the world has of an earlier process of this robot.
     pub(crate) fn take_up(&mut self, now: &Now<'_>) {
         // The world takes nothing of one that is lost, but whoever hears it goes on counting.
-        self.sequence = self.sequence.max(now.me().acknowledged + 1);
+        self.sequence = self.sequence.max(now.me().acknowledged.saturating_add(1));
         self.asked = Asked::after(now.me());
     }
 

@@ -60,10 +60,11 @@ impl Asked {
         self.ask_for(ahead.request(), sequence);
     }
 
-    /// Asks for this path under a new number, first in the command of number `sequence`.
+    /// Asks for this path under a new number, first in the command of number `sequence`. Past the
+    /// last number there is, which no run gets to, it is a number that the world refuses.
     pub(crate) fn ask_for(&mut self, request: PathRequest, sequence: u64) {
         self.request = PathRequest {
-            id: self.request.id + 1,
+            id: self.request.id.wrapping_add(1),
             ..request
         };
         self.sequence = sequence;

@@ -127,7 +127,7 @@ impl Robot {
             incarnation: self.incarnation,
         };
         self.intent.hard_request = None;
-        self.intent.sequence += 1;
+        self.intent.sequence = self.intent.sequence.saturating_add(1);
         let (phase, doing) = match &mut self.mind {
             Mind::Selects(selector) => selector.act(&now, units, &mut self.intent),
             Mind::Follows(follower) => follower.act(&now, &mut self.intent),
