@@ -142,12 +142,7 @@ fn ways_of(
             trace(ground, carrying, &to_goal, from.grasp),
         ];
         for (other, place) in places.iter().enumerate() {
-            let is_on = |way: &Way| {
-                let kept = &place.cells[way.class];
-                way.cells
-                    .iter()
-                    .any(|cell| kept.binary_search(cell).is_ok())
-            };
+            let is_on = |way: &Way| place.closes_any(way.class, &way.cells);
             if other != object && place.is_open() && ways.iter().any(is_on) {
                 found.blames.push(Blame {
                     object: other,
@@ -219,9 +214,8 @@ fn place_for(
     }
     points.sort_unstable();
     let stands = |place: &Place| {
-        let clear = |other: &Place, class: usize| {
-            !other.is_open() || place.cells[class].binary_search(&other.grasp).is_err()
-        };
+        let clear =
+            |other: &Place, class: usize| !other.is_open() || !place.closes(class, other.grasp);
         (0..rests.len())
             .filter(|&other| other != object)
             .all(|other| {
@@ -239,12 +233,7 @@ fn place_for(
         } else {
             ways.ways.len()
         };
-        let is_on = |way: &&Way| {
-            let kept = &place.cells[way.class];
-            way.cells
-                .iter()
-                .any(|cell| kept.binary_search(cell).is_ok())
-        };
+        let is_on = |way: &&Way| place.closes_any(way.class, &way.cells);
         ways.ways[from..until]
             .iter()
             .flatten()

@@ -175,18 +175,11 @@ impl Hops {
     }
 
     /// The moves of an order, in turn: number of the move, and its robot.
-    fn moves_of<'a>(
-        &'a self,
-        order: &'a [Item],
-        next: &'a mut Vec<usize>,
-    ) -> impl Iterator<Item = (usize, usize)> + 'a {
-        next.clear();
-        next.extend(self.of.iter().map(|&(first, _)| first));
-        order.iter().map(move |&(object, robot)| {
-            let number = next[object as usize];
-            next[object as usize] += 1;
-            (number, robot as usize)
-        })
+    fn moves_of<'a>(&self, order: &'a [Item]) -> impl Iterator<Item = (usize, usize)> + use<'a> {
+        let mut progress = Progress::new(self);
+        order
+            .iter()
+            .map(move |&item| (progress.make(item), item.1 as usize))
     }
 
     /// The least time that an order takes, with the walls alone; none if something in it comes too
@@ -195,8 +188,7 @@ impl Hops {
         let mut last = [usize::MAX; MAX_ROBOTS];
         let mut busy: Vec<Time> = self.free.iter().map(|&(time, _)| time).collect();
         let mut done = vec![false; self.list.len()];
-        let mut next = Vec::new();
-        for (hop, robot) in self.moves_of(order, &mut next) {
+        for (hop, robot) in self.moves_of(order) {
             if self.before[hop].iter().any(|&before| !done[before]) {
                 return None;
             }
@@ -222,8 +214,7 @@ impl Hops {
     /// By move of an order: when its robot has to be home again, if that is its last one; else when
     /// it would have to be, so that all is done before `limit`.
     pub(crate) fn home_by(&self, order: &[Item], limit: Time) -> Vec<Time> {
-        let mut next = Vec::new();
-        let moves: Vec<(usize, usize)> = self.moves_of(order, &mut next).collect();
+        let moves: Vec<(usize, usize)> = self.moves_of(order).collect();
         // By robot: the move that comes next, and what it takes at least from its approach until
         // the robot is home for good, beyond the approach itself.
         let mut later: [Option<(usize, Time)>; MAX_ROBOTS] = [None; MAX_ROBOTS];
@@ -261,11 +252,13 @@ impl Progress {
         self.next[object]
     }
 
-    /// Takes note that a robot makes the next move of an object.
-    pub(crate) fn make(&mut self, (object, robot): Item) {
+    /// Takes note that a robot makes the next move of an object; the number of that move.
+    pub(crate) fn make(&mut self, (object, robot): Item) -> usize {
         let next = &mut self.next[object as usize];
-        self.last[robot as usize] = Some(*next);
+        let made = *next;
+        self.last[robot as usize] = Some(made);
         *next += 1;
+        made
     }
 
     /// Where an object stands.
@@ -362,8 +355,8 @@ impl Clocks {
     pub(crate) fn make(&mut self, hops: &Hops, object: usize, robot: usize) {
         let hop = self.progress.next(object);
         self.busy[robot] = self.released_by(hops, hop, robot, exact);
-        self.done[hop] = true;
         self.progress.make((object as u32, robot as u32));
+        self.done[hop] = true;
     }
 }
 

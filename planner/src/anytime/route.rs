@@ -8,10 +8,10 @@
 //! opens, and the next leg goes on as another class. The last leg ends where the robot may stay for
 //! ever.
 //! Source: Phillips and Likhachev, "SIPP", ICRA 2011; the legs are layers of one search, so that a
-//! grasp is never made at a time from which there is no way on. What is ahead counts a quarter more
-//! than it takes at least (weighted A*, Pohl 1970): a way takes at most a quarter more than the
-//! quickest, and in practice no more, but whoever has to wait or go round does not look at all that
-//! is as quick so far.
+//! grasp is never made at a time from which there is no way on. In haste what is ahead counts a
+//! quarter more than it takes at least (weighted A*, Pohl 1970): a way takes at most a quarter more
+//! than the quickest, and mostly no more, but whoever has to wait or go round does not look at all
+//! that is as quick so far.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -99,6 +99,8 @@ pub(crate) struct Router {
     closed: Vec<u32>,
     round: u32,
     points: usize,
+    /// Whether ways need not be the quickest.
+    pub(crate) is_hasty: bool,
     /// Nodes to expand, the one that promises most first, then the latest.
     open: BinaryHeap<Reverse<(u64, u32)>>,
     /// Lower bound of what follows each leg.
@@ -117,6 +119,7 @@ impl Router {
             closed: Vec::new(),
             round: 0,
             points: ground.points(),
+            is_hasty: false,
             open: BinaryHeap::new(),
             rest: Vec::new(),
             expanded: 0,
@@ -250,7 +253,8 @@ impl Router {
                 index
             }
         };
-        let key = node.time.saturating_add(ahead + ahead / 4);
+        let more = if self.is_hasty { ahead / 4 } else { 0 };
+        let key = node.time.saturating_add(ahead + more);
         let key = u64::from(key) << 32 | u64::from(!node.time);
         self.open.push(Reverse((key, index)));
     }

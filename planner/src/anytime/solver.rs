@@ -258,6 +258,7 @@ impl Solver {
         let hops = Hops::new(scene, &mut self.ground, &self.start, &self.homes, sequence)?;
         let objects: Vec<u32> = sequence.iter().map(|(object, _)| *object as u32).collect();
         let mut found = None;
+        self.router.is_hasty = true;
         for mode in MODES {
             self.mode = mode;
             self.known.clear();
@@ -266,8 +267,9 @@ impl Solver {
                 break;
             }
         }
+        self.router.is_hasty = false;
+        self.known.clear();
         let (makespan, order) = found?;
-        self.tried.insert(order.clone());
         self.current = Some((Rc::new(hops), order));
         let source = self.current.clone();
         Some(self.keep(makespan, source))

@@ -131,6 +131,11 @@ impl Place {
         is_near && closed.binary_search(&cell).is_ok()
     }
 
+    /// Whether it keeps a class of bodies away from any of these cells.
+    pub(crate) fn closes_any(&self, class: usize, cells: &[u32]) -> bool {
+        cells.iter().any(|&cell| self.closes(class, cell))
+    }
+
     /// Whether a robot without an object that is at this cell is in its room.
     pub(crate) fn has_in_its_room(&self, cell: u32) -> bool {
         self.closes(ROBOT_ALONE.0, cell)

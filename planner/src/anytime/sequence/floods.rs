@@ -219,8 +219,7 @@ impl Sequencer {
             way.push(self.from[way[way.len() - 1] as usize]);
         }
         for (other, place) in places.iter().enumerate() {
-            let meets = |cell: &u32| place.cells[class].binary_search(cell).is_ok();
-            if other != object && way.iter().any(meets) {
+            if other != object && place.closes_any(class, &way) {
                 crossed.push(other);
             }
         }

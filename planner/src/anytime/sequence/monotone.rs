@@ -161,10 +161,7 @@ impl Sequencer {
 impl Ways {
     /// Whether an object at a place may be in the way.
     pub(super) fn meets(&self, place: &Place) -> bool {
-        let meets = |class: usize, cells: &[u32]| {
-            let kept = &place.cells[class];
-            cells.iter().any(|cell| kept.binary_search(cell).is_ok())
-        };
+        let meets = |class: usize, cells: &[u32]| place.closes_any(class, cells);
         !self.is_whole || meets(self.class, &self.carrying) || meets(ROBOT_ALONE.0, &self.alone)
     }
 }

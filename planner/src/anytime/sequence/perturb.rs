@@ -154,11 +154,7 @@ impl Sequencer {
             let grasp = scene.objects[object].grasps[usize::from(by)].offset;
             let at = scene.lattice.at(cell) - grasp;
             let place = Place::of(scene, ground, object, at).held(by);
-            let kept = &place.cells[ROBOT_ALONE.0];
-            let is_clear = self
-                .homes
-                .iter()
-                .all(|home| kept.binary_search(home).is_err());
+            let is_clear = !place.closes_any(ROBOT_ALONE.0, &self.homes);
             if place.grasp != NOWHERE && is_clear && self.can_move(ground, places, object, &place) {
                 return Some((object, place));
             }

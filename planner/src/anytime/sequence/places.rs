@@ -142,11 +142,7 @@ impl Sequencer {
         crossing: &Crossing,
         with_goals: bool,
     ) -> bool {
-        let free = |class: usize, cells: &[u32]| {
-            cells
-                .iter()
-                .all(|cell| place.cells[class].binary_search(cell).is_err())
-        };
+        let free = |class: usize, cells: &[u32]| !place.closes_any(class, cells);
         let ways = free(crossing.class, &crossing.carrying)
             && free(ROBOT_ALONE.0, &crossing.alone)
             && free(ROBOT_ALONE.0, &self.homes);

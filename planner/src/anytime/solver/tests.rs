@@ -1,7 +1,10 @@
 //! What reservations have to be true to.
 
+use std::collections::BTreeSet;
+
 use super::testing::{cells, planned, solver_of, written};
 use super::*;
+use crate::anytime::ground::duration;
 use crate::anytime::keep::kept;
 use crate::anytime::plan::lay::enter;
 use crate::anytime::route::sides;
@@ -240,4 +243,113 @@ fn what_a_search_for_a_shortest_plan_looks_at_is_charged() {
     assert!(solver.small_configurations >= 10);
     let least = solver.small_configurations * UNITS_PER_SMALL_CONFIGURATION;
     assert!(solver.units() - before >= least);
+}
+
+/// How long a robot takes from one point to another among what is closed to it, if it can.
+fn quickest(
+    ground: &Ground,
+    class: usize,
+    (from, to): (u32, u32),
+    closed: &HashSet<u32>,
+) -> Option<Time> {
+    let mut open = BTreeSet::from([(0, from)]);
+    let mut done = HashSet::new();
+    while let Some((time, cell)) = open.pop_first() {
+        if cell == to {
+            return Some(time);
+        }
+        if !done.insert(cell) {
+            continue;
+        }
+        let steps = ground.walls(class).steps(cell);
+        for direction in (0..8).filter(|direction| steps >> direction & 1 == 1) {
+            let next = cell.wrapping_add_signed(ground.offsets[direction]);
+            let mut passed = sides(ground, cell, direction).into_iter().flatten();
+            if !closed.contains(&next) && passed.all(|side| !closed.contains(&side)) {
+                open.insert((time + duration(direction), next));
+            }
+        }
+    }
+    None
+}
+
+/// How long a single robot takes to move one object and to go home, while all others stand, if it
+/// can.
+fn quickest_alone(solver: &Solver, object: usize) -> Option<Time> {
+    let (hops, _) = solver.current.as_ref()?;
+    let hop = &hops.list[hops.of[object].0];
+    let (ground, home) = (&solver.ground, solver.homes[0]);
+    let leg = |class: usize, from: u32, to: u32, own: &[u32]| {
+        let rests = solver.start.rests();
+        let others = (0..rests.len()).filter(|&other| other != object);
+        let closed = others.flat_map(|other| rests[other].place.cells[class].clone());
+        quickest(
+            ground,
+            class,
+            (from, to),
+            &closed.chain(own.to_vec()).collect(),
+        )
+    };
+    let alone = ROBOT_ALONE.0;
+    let approach = leg(alone, home, hop.from.grasp, &hop.from.bare)?;
+    let transfer = leg(hop.class, hop.from.grasp, hop.to.grasp, &[])?;
+    let back = leg(alone, hop.to.grasp, home, &hop.to.bare)?;
+    Some(approach + ground.grasp + transfer + ground.release + back)
+}
+
+/// A crowded room with a single robot.
+fn planned_for_one(seed: u64) -> (Scene, Solver, Time) {
+    planned(&scene::GenerateOptions {
+        seed,
+        robots: 1,
+        objects: 8,
+        area_m2: 30.0,
+        ..scene::GenerateOptions::default()
+    })
+}
+
+#[test]
+fn ways_are_the_quickest_unless_in_haste() {
+    let (mut moved, mut longer) = (0, 0);
+    for seed in 0..12 {
+        let (scene, mut solver, _) = planned_for_one(seed);
+        let (hops, _) = solver.current.clone().unwrap();
+        for object in 0..scene.objects.len() {
+            if hops.of[object].0 == hops.of[object].1 {
+                continue;
+            }
+            let least = quickest_alone(&solver, object);
+            let order = [(object as u32, 0)];
+            let found = [false, true].map(|is_hasty| {
+                solver.router.is_hasty = is_hasty;
+                solver.known.clear();
+                solver.decode(&scene, &hops, &order, EVER)
+            });
+            assert_eq!(found[0], least, "seed {seed}: {object}");
+            let Some(least) = least else { continue };
+            assert!(
+                found[1].unwrap() <= least + least / 4,
+                "seed {seed}: {object}"
+            );
+            moved += 1;
+            longer += usize::from(found[1].unwrap() > least);
+        }
+    }
+    assert!(moved > 12 && longer > 0, "{longer} of {moved} were longer");
+}
+
+#[test]
+fn improving_begins_with_the_first_order_by_the_quickest_ways() {
+    let mut is_better = false;
+    for seed in 0..12 {
+        let (scene, mut solver, first) = planned_for_one(seed);
+        let (hops, order) = solver.current.clone().unwrap();
+        solver.improve(&scene);
+        let better = solver.best.as_ref().unwrap().makespan;
+        solver.known.clear();
+        let again = solver.decode(&scene, &hops, &order, EVER).unwrap();
+        assert_eq!(better, again.min(first), "seed {seed}");
+        is_better |= better < first;
+    }
+    assert!(is_better, "haste never made anything longer");
 }
