@@ -35,8 +35,8 @@ impl Aabb {
     #[must_use]
     pub fn around(a: Vec2, b: Vec2) -> Self {
         Self {
-            min: a.inf(&b),
-            max: a.sup(&b),
+            min: Vec2::new(a.x.min(b.x), a.y.min(b.y)),
+            max: Vec2::new(a.x.max(b.x), a.y.max(b.y)),
         }
     }
 
@@ -44,8 +44,8 @@ impl Aabb {
     #[must_use]
     pub fn joined(self, other: Self) -> Self {
         Self {
-            min: self.min.inf(&other.min),
-            max: self.max.sup(&other.max),
+            min: Self::around(self.min, other.min).min,
+            max: Self::around(self.max, other.max).max,
         }
     }
 
@@ -67,13 +67,14 @@ impl Aabb {
         }
     }
 
-    /// Whether the two have a point in common.
+    /// Whether the two have a point in common. All four are compared at once: which of them
+    /// holds nobody can foresee, whether all do mostly.
     #[must_use]
     pub fn meets(&self, other: &Self) -> bool {
-        self.min.x <= other.max.x
-            && other.min.x <= self.max.x
-            && self.min.y <= other.max.y
-            && other.min.y <= self.max.y
+        (self.min.x <= other.max.x)
+            & (other.min.x <= self.max.x)
+            & (self.min.y <= other.max.y)
+            & (other.min.y <= self.max.y)
     }
 }
 

@@ -174,12 +174,34 @@ impl Bodies {
         clearance: bool,
         other: Sweep,
     ) -> bool {
-        if !self
-            .region(sweep, clearance)
-            .meets(&self.region(other, false))
-        {
-            return false;
-        }
+        let path = std::slice::from_ref(&other.to);
+        self.meets_path(scene, sweep, clearance, (other.class, other.from), path)
+    }
+
+    /// The same of a body that goes from where it is along `path`, or stands there if that is
+    /// empty.
+    pub(crate) fn meets_path(
+        &self,
+        scene: &Scene,
+        sweep: Sweep,
+        clearance: bool,
+        (class, start): (ClassId, Vec2),
+        path: &[Vec2],
+    ) -> bool {
+        let region = self.region(sweep, clearance);
+        let (bare, _) = self.boxes[class.0];
+        let stand = [start];
+        let ends = if path.is_empty() { &stand } else { path };
+        let mut from = start;
+        ends.iter().any(|&to| {
+            let piece = Sweep { class, from, to };
+            from = to;
+            let is_near = Aabb::around(piece.from, to).swept_by(bare).meets(&region);
+            is_near && self.parts_meet(scene, sweep, clearance, piece)
+        })
+    }
+
+    fn parts_meet(&self, scene: &Scene, sweep: Sweep, clearance: bool, other: Sweep) -> bool {
         let parts = &scene.body(sweep.class).parts;
         scene.body(other.class).parts.iter().any(|obstacle| {
             parts.iter().any(|part| {

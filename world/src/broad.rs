@@ -12,6 +12,9 @@ pub(crate) use scene::near::Aabb;
 
 use crate::objects::Touched;
 
+/// No more things than this are gone through one by one, which takes less than finding cells.
+const FEW: usize = 16;
+
 /// Least size of a cell of objects, m.
 const LEAST_OBJECT_CELL_M: f64 = 0.1;
 
@@ -88,13 +91,17 @@ impl Ground {
         region: Aabb,
         mut hit: impl FnMut(usize, Vec2) -> bool,
     ) -> Option<usize> {
+        let mut is_met =
+            |object: usize, at| self.boxes[object].at(at).meets(&region) && hit(object, at);
+        if self.boxes.len() <= FEW {
+            let is_here = |&o: &usize| self.near.place(o).is_some_and(|at| is_met(o, at));
+            return (0..self.boxes.len()).find(is_here);
+        }
         let wide = Aabb {
             min: region.min - self.reach.max,
             max: region.max - self.reach.min,
         };
-        self.near.find(wide, |object, at| {
-            self.boxes[object].at(at).meets(&region) && hit(object, at)
-        })
+        self.near.find(wide, is_met)
     }
 }
 
@@ -142,10 +149,13 @@ impl Walls {
     /// Whether `hit(wall)` holds for any wall whose box meets `region`. A wall may be asked about
     /// more than once.
     pub(crate) fn any_near(&self, region: Aabb, mut hit: impl FnMut(usize) -> bool) -> bool {
+        let mut is_met = |wall: usize| self.boxes[wall].meets(&region) && hit(wall);
+        if self.boxes.len() <= FEW {
+            return (0..self.boxes.len()).any(is_met);
+        }
         self.cells.touched(region).any(|cell| {
-            self.walls[self.starts[cell]..self.starts[cell + 1]]
-                .iter()
-                .any(|&wall| self.boxes[wall].meets(&region) && hit(wall))
+            let here = self.starts[cell]..self.starts[cell + 1];
+            self.walls[here].iter().any(|&wall| is_met(wall))
         })
     }
 }
@@ -155,17 +165,37 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::testing::{BELOW, room};
+    use crate::testing::{BELOW, room, room_text};
 
-    fn scene() -> Scene {
+    /// With few objects, or with so many that they are kept in cells.
+    fn scene(objects: u32) -> Scene {
         let homes = [[9.0, 0.5]];
-        let objects: Vec<_> = (0..12)
+        let objects: Vec<_> = (0..objects)
             .map(|i| {
-                let (x, y) = (0.5 + 0.7 * f64::from(i), 1.0 + 0.3 * f64::from(i % 4));
-                [[x, y], [x, y + 2.0]]
+                let (column, row) = (f64::from(i % 12), f64::from(i / 12));
+                let (x, y) = (0.5 + 0.7 * column, 0.7 + 2.7 * row + 0.3 * (column % 4.0));
+                [[x, y], [x, y + 1.0]]
             })
             .collect();
         room(&homes, &objects, BELOW, "")
+    }
+
+    /// As many walls as make cells worth while.
+    fn pillars() -> Scene {
+        let pillars = (0..FEW).map(|i| {
+            let (x, y) = (1.0 + (i % 8) as f64, 2.0 + (i / 8) as f64);
+            format!(
+                "{{ box = [{x:.1}, {y:.1}, {:.1}, {:.1}] }}",
+                x + 0.2,
+                y + 0.7
+            )
+        });
+        let walls = format!(
+            "walls = [{}]\n[[robots]]",
+            pillars.collect::<Vec<_>>().join(", ")
+        );
+        let text = room_text(&[[9.0, 0.5]], &[], BELOW, "").replacen("[[robots]]", &walls, 1);
+        scene::parse(&text, "pillars.toml").unwrap()
     }
 
     fn all(scene: &Scene, ground: &Ground, region: Aabb) -> Vec<usize> {
@@ -183,10 +213,11 @@ mod tests {
         #[test]
         fn none_near_is_missed(
             x in -1.0..11.0, y in -1.0..7.0, width in 0.0..4.0, height in 0.0..4.0,
+            more in proptest::bool::ANY,
             taken in proptest::collection::vec(0_usize..12, 0..12),
             put in proptest::collection::vec((0_usize..12, 0.3..9.7, 0.3..5.7), 0..12),
         ) {
-            let scene = scene();
+            let scene = scene(if more { 20 } else { 12 });
             let mut ground = Ground::with(&scene, |object| Some(scene.objects[object].start));
             for object in taken {
                 ground.take(object);
@@ -209,8 +240,11 @@ mod tests {
         }
 
         #[test]
-        fn no_wall_near_is_missed(x in -1.0..11.0, y in -1.0..7.0, size in 0.0..4.0) {
-            let scene = scene();
+        fn no_wall_near_is_missed(
+            x in -1.0..11.0, y in -1.0..7.0, size in 0.0..4.0, more in proptest::bool::ANY,
+        ) {
+            let scene = if more { pillars() } else { scene(1) };
+            prop_assert_eq!(scene.walls.len() > FEW, more);
             let walls = Walls::new(&scene);
             let corner = Vec2::new(x, y);
             let region = Aabb::around(corner, corner + Vec2::new(size, size));

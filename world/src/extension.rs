@@ -106,17 +106,8 @@ impl Field<'_> {
 
     /// Whether a sweep with clearance meets the body of `other` along `path` from `start`.
     fn meets_path(&self, sweep: Sweep, other: &Robot, start: Vec2, path: &[Vec2]) -> bool {
-        let class = other.class(self.scene);
-        let meets = |piece| self.bodies.sweeps_meet(self.scene, sweep, true, piece);
-        if path.is_empty() {
-            return meets(Sweep::standing(class, start));
-        }
-        let mut from = start;
-        path.iter().any(|&to| {
-            let piece = Sweep { class, from, to };
-            from = to;
-            meets(piece)
-        })
+        let other = (other.class(self.scene), start);
+        (self.bodies).meets_path(self.scene, sweep, true, other, path)
     }
 }
 

@@ -14,7 +14,7 @@ use scene::{Scene, Vec2};
 use shm_types::{EventKind, TaskStatus};
 
 use crate::bodies::Sweep;
-use crate::cleared::{Change, Cleared, is_between};
+use crate::cleared::{Change, Cleared, is_between, is_same};
 use crate::journal::Event;
 use crate::path::ARRIVAL_M;
 use crate::state::{Robot, id, is_at};
@@ -203,6 +203,11 @@ impl World {
             if found.is_none() {
                 found = self.check_motion(i, !has_changed);
                 found = found.or_else(|| self.check_hand(scene, i));
+                if found.is_none()
+                    && let Some(object) = robot.hand.holding()
+                {
+                    self.objects.touched().pass(object);
+                }
             }
         }
         self.count_checks(changed, holding);
@@ -253,7 +258,7 @@ impl World {
         let moved_m = robot.track.moved_m();
         let used_m = || robot.granted_m - robot.grant.length_from(robot.position);
         let on_grant = !robot.moved || followed || (used_m() - moved_m).abs() <= 8.0 * ARRIVAL_M;
-        let on_track = robot.position == robot.track.end();
+        let on_track = is_same(robot.position, robot.track.end());
         let in_time = moved_m <= self.tick_m + ARRIVAL_M;
         (!on_grant || !on_track || !in_time).then_some(Violation::Motion { robot: id(i) })
     }
@@ -264,7 +269,7 @@ impl World {
         let held = &self.objects[object];
         let place = robot.place_of(scene, object);
         let agreed = held.holder == Some(i)
-            && held.position == place
+            && is_same(held.position, place)
             && held.status == TaskStatus::Held
             && self.bodies.ground.place(object).is_none();
         (!agreed).then_some(Violation::Holding {
@@ -377,9 +382,9 @@ impl World {
         if robot.grant.is_empty() && other.grant.is_empty() {
             return false;
         }
-        pieces_from(scene, robot, change.start, change.new_from).any(|piece| {
-            pieces(scene, other).any(|other| self.bodies.sweeps_meet(scene, piece, false, other))
-        })
+        let (at, path) = ((other.class(scene), other.position), other.grant.points());
+        pieces_from(scene, robot, change.start, change.new_from)
+            .any(|piece| self.bodies.meets_path(scene, piece, false, at, path))
     }
 
     /// The objects of which something could have changed: they are noted wherever they can be, and
@@ -411,7 +416,9 @@ impl World {
         let gripped =
             (object.holder.or(object.claimed_by)).is_some_and(|i| hand(i).object() == Some(index));
         match (object.holder, self.bodies.ground.place(index)) {
-            (None, Some(at)) => at == object.position && at == object.rest && !gripped,
+            (None, Some(at)) => {
+                is_same(at, object.position) && is_same(at, object.rest) && !gripped
+            }
             (None, None) => gripped && is_at(object.position, object.rest),
             (Some(i), None) => hand(i).holding() == Some(index),
             (Some(_), Some(_)) => false,
@@ -419,12 +426,8 @@ impl World {
     }
 }
 
-/// The straight pieces of a robot's remaining grant; standing there if it has none.
-fn pieces<'a>(scene: &'a Scene, robot: &'a Robot) -> impl Iterator<Item = Sweep> + 'a {
-    pieces_from(scene, robot, robot.position, 0)
-}
-
-/// From `start` on to the points of its grant, but the first `passed`.
+/// The straight pieces of a robot's grant from `start` on, but the first `passed`; standing there
+/// if that are all.
 fn pieces_from<'a>(
     scene: &'a Scene,
     robot: &'a Robot,

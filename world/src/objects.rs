@@ -74,6 +74,11 @@ impl Touched {
         std::mem::replace(&mut self.unchecked.0[word], 0)
     }
 
+    /// One that has been checked: what a robot holds, with the robot.
+    pub(crate) const fn pass(&mut self, object: usize) {
+        self.unchecked.0[object / 64] &= !(1 << (object % 64));
+    }
+
     /// All are to be checked.
     pub(crate) const fn check_all(&mut self) {
         self.unchecked = Noted::ALL;
