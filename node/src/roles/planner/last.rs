@@ -19,12 +19,18 @@ pub(super) struct LastSchedule {
     path: PathBuf,
     /// Version of the newest one that this process has tried to write.
     version: u32,
+    /// Whether that failed.
+    has_failed: bool,
 }
 
 impl LastSchedule {
     /// In this file.
     pub(super) const fn new(path: PathBuf) -> Self {
-        Self { path, version: 0 }
+        Self {
+            path,
+            version: 0,
+            has_failed: false,
+        }
     }
 
     /// The one that an earlier process has left; `None` if there is none, or what there is, is no
@@ -44,13 +50,15 @@ impl LastSchedule {
     /// Writes `schedule` down in the place of the one before, once for each version.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// It cannot be written, and the one before could: the same is not said again with each version.
     pub(super) fn write(&mut self, schedule: &Schedule) -> Result<(), DomainError> {
         if schedule.version == self.version {
             return Ok(());
         }
         self.version = schedule.version;
-        domain::put(&self.path, schedule.as_bytes())
+        let written = domain::put(&self.path, schedule.as_bytes());
+        let had_failed = std::mem::replace(&mut self.has_failed, written.is_err());
+        if had_failed { Ok(()) } else { written }
     }
 }
 
@@ -89,5 +97,26 @@ mod tests {
         let bytes = fs::read(&last.path).unwrap();
         fs::write(&last.path, &bytes[..bytes.len() - 1]).unwrap();
         assert!(last.read(COUNTS).is_none(), "it is cut off");
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_said_once_and_tried_again_with_the_next() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("schedule");
+        fs::create_dir(&path).unwrap();
+        let mut last = LastSchedule::new(path.clone());
+        let mut schedule: Box<Schedule> = zeroed();
+        let mut write = |version| {
+            schedule.version = version;
+            last.write(&schedule).is_ok()
+        };
+        assert!(!write(1), "a directory is in the way");
+        assert!(write(2), "as before: nothing new to say");
+        fs::remove_dir(&path).unwrap();
+        assert!(write(3));
+        assert!(path.is_file(), "it was tried again");
+        fs::remove_file(&path).unwrap();
+        fs::create_dir(&path).unwrap();
+        assert!(!write(4), "this is new");
     }
 }
