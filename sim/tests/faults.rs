@@ -91,7 +91,9 @@ fn fresh_seeds_are_safe() {
 #[test]
 fn seeds_that_once_failed_pass() {
     let early = [12, 17, 18, 28, 74, 144, 208, 256, 320, 413, 421, 632];
-    let late = [1_002_354, 1_002_508, 1_003_612, 1_007_249, 2_001_292];
+    let late = [
+        1_002_354, 1_002_508, 1_003_612, 1_007_249, 2_001_292, 4_000_768,
+    ];
     for seed in early.into_iter().chain(late) {
         let trial = trial(seed);
         let finding = trial.run(trial.plan(), &mut ()).finding;

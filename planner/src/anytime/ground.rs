@@ -110,17 +110,10 @@ impl Ground {
                 let (kept, there) = (pair / classes, pair % classes);
                 let pitch_m = scene.lattice.pitch_m;
                 let body = |class| scene.body(ClassId(class));
-                let all = offsets_of(body(kept), body(there), pitch_m);
-                // Where stops lie beside the lattice, bodies are up to a step from where they are
-                // planned to be.
-                Mask::of(if scene.lattice.exact {
-                    all
-                } else {
-                    grown(&all)
-                })
+                Mask::of(offsets_of(body(kept), body(there), pitch_m))
             })
             .collect();
-        Self {
+        let mut ground = Self {
             lattice: scene.lattice.clone(),
             width: scene.lattice.width as i32,
             height: scene.lattice.height as i32,
@@ -141,6 +134,18 @@ impl Ground {
             grasp: units(scene.robot.grasp_ns),
             release: units(scene.robot.release_ns),
             flooded: Rc::default(),
+        };
+        if !scene.lattice.exact {
+            ground.leave_margins();
+        }
+        ground
+    }
+
+    /// Robots stop beside the lattice, up to a step from where they are planned to be: they keep
+    /// others that much further away.
+    pub(crate) fn leave_margins(&mut self) {
+        for mask in &mut self.masks {
+            *mask = Mask::of(grown(&mask.all));
         }
     }
 

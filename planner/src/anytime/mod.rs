@@ -109,6 +109,8 @@ pub(crate) struct Anytime {
     solver: Option<Box<Solver>>,
     /// Where everything stood when planning began.
     situation: Situation,
+    /// Whether the next plan is looked for without margins, since there is none with them.
+    is_tight: bool,
     /// By robot, 1 if it takes part.
     team: Vec<u32>,
     /// Whether the plan is one for all objects.
@@ -141,6 +143,7 @@ impl Anytime {
             settings: settings.clone(),
             solver: None,
             situation: Situation::default(),
+            is_tight: false,
             team: Vec::new(),
             verdict: Verdict::Open,
             stage: Stage::New,
@@ -231,6 +234,9 @@ impl Anytime {
             }
             Stage::New => {
                 self.situation = Situation::of(&snapshot);
+                self.situation.needs_margins = !std::mem::take(&mut self.is_tight)
+                    && scene.lattice.exact
+                    && self.situation.is_beside(scene);
                 let situation = &self.situation;
                 self.solver = Solver::new(scene, &self.settings, situation).map(Box::new);
                 (self.spent, self.cells, self.ways) = (0, 0, 0);
@@ -340,6 +346,10 @@ impl Anytime {
     fn go_on_after(&mut self, attempts: u64, solver: &mut Solver, scene: &Scene) -> Stage {
         let most = self.settings.units_per_second.saturating_mul(MOST_S);
         match attempts {
+            ATTEMPTS_BEFORE_PROOF if self.situation.needs_margins => {
+                self.is_tight = true;
+                Stage::New
+            }
             ATTEMPTS_BEFORE_PROOF if solver.is_short => self.most(solver, scene),
             ATTEMPTS_BEFORE_PROOF if solver.is_start => Stage::Prove,
             ATTEMPTS_BEFORE_SEARCH => Stage::Search,

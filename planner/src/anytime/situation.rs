@@ -37,6 +37,8 @@ pub(crate) struct Situation {
     pub(crate) objects: Vec<ObjectAt>,
     /// Whether it is as the scene says.
     pub(crate) is_start: bool,
+    /// Whether robots are to keep a step more between them than where they are planned to be says.
+    pub(crate) needs_margins: bool,
 }
 
 impl Situation {
@@ -58,6 +60,7 @@ impl Situation {
             robots: scene.homes.iter().map(robot).collect(),
             objects: scene.objects.iter().map(object).collect(),
             is_start: true,
+            needs_margins: false,
         }
     }
 
@@ -81,7 +84,21 @@ impl Situation {
             objects: objects.iter().map(object).collect(),
             is_start: (robots.iter()).all(|robot| robot.live == 1 && robot.actions == 0)
                 && objects.iter().all(|object| object.put_downs == 0),
+            needs_margins: false,
         }
+    }
+
+    /// Whether some robot stands beside the lattice, or would to take an object from where it is.
+    pub(crate) fn is_beside(&self, scene: &Scene) -> bool {
+        let live = self.robots.iter().filter(|robot| robot.is_live);
+        let movable = scene.objects.iter().zip(&self.objects);
+        let movable = movable.filter(|(_, state)| state.is_movable);
+        let grasps = movable.flat_map(|(object, state)| {
+            let grasps = object.grasps.iter();
+            grasps.map(|grasp| state.at + grasp.offset)
+        });
+        let mut stops = live.map(|robot| robot.at).chain(grasps);
+        stops.any(|at| scene.lattice.cell(at).is_none())
     }
 
     /// Whether some robot is gone.

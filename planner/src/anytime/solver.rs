@@ -134,7 +134,10 @@ impl Solver {
         if places * scene.lattice.len() > MOST_DISTANCES {
             return None;
         }
-        let ground = Ground::new(scene, settings, situation.obstacles(scene));
+        let mut ground = Ground::new(scene, settings, situation.obstacles(scene));
+        if situation.needs_margins {
+            ground.leave_margins();
+        }
         let start = Start::new(scene, &ground, situation)?;
         let homes: Option<Vec<u32>> = (scene.homes.iter().zip(&start.robots))
             .map(|(&home, track)| {

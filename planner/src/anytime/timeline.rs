@@ -65,8 +65,17 @@ pub(crate) struct Timeline {
     points: usize,
     /// Lists that are not empty.
     touched: Vec<u32>,
+    excused: Vec<Excused>,
     /// Where a body that is being entered keeps a class away since when: by class and cell.
     since: Vec<Time>,
+}
+
+/// Where an owner keeps a class away from a cell, it does not as long as it stands at `start`.
+struct Excused {
+    class: usize,
+    cell: u32,
+    owner: Owner,
+    start: u32,
 }
 
 /// A body on its way, being entered piece by piece.
@@ -83,6 +92,7 @@ impl Timeline {
             lists: vec![Vec::new(); points * ground.classes],
             points,
             touched: Vec::new(),
+            excused: Vec::new(),
             since: vec![EVER; points * ground.classes],
         }
     }
@@ -91,6 +101,33 @@ impl Timeline {
     pub(crate) fn clear(&mut self) {
         for index in self.touched.drain(..) {
             self.lists[index as usize].clear();
+        }
+        self.excused.clear();
+    }
+
+    /// `owner` does not keep this class away from `cell` as long as it stands at `start`, nor with a
+    /// step from there that leads away. To be said before it is entered.
+    pub(crate) fn excuse(&mut self, class: usize, cell: u32, owner: Owner, start: u32) {
+        self.excused.push(Excused {
+            class,
+            cell,
+            owner,
+            start,
+        });
+    }
+
+    /// What is excused of where a body stands is not entered: it counts from `time` on, and only if
+    /// the body still keeps away from there at `next`.
+    fn pardon(&mut self, ground: &Ground, walker: &Walker, next: Option<u32>, time: Time) {
+        for at in 0..self.excused.len() {
+            let excused = &self.excused[at];
+            if (excused.owner, excused.start) != (walker.owner, walker.cell) {
+                continue;
+            }
+            let mask = ground.mask(excused.class, walker.class);
+            let keeps_away = next.is_some_and(|next| mask.has(ground.offset(excused.cell, next)));
+            let index = self.index(excused.class, excused.cell);
+            self.since[index] = if keeps_away { time } else { EVER };
         }
     }
 
@@ -211,6 +248,7 @@ impl Timeline {
         let start = ground.xy(walker.cell);
         let next = walker.cell.wrapping_add_signed(ground.offsets[direction]);
         let end = ground.xy(next);
+        self.pardon(ground, walker, Some(next), depart);
         for kept in 0..ground.classes {
             let mask = ground.mask(kept, walker.class);
             self.open(ground, kept, end, &mask.entered[direction], depart);
@@ -276,6 +314,7 @@ impl Timeline {
     /// Ends entering: the body is there until `time`, its steps before `step` made.
     pub(crate) fn leave(&mut self, ground: &Ground, walker: &Walker, time: Time, step: u32) {
         let at = ground.xy(walker.cell);
+        self.pardon(ground, walker, None, time);
         for kept in 0..ground.classes {
             let mask = &ground.mask(kept, walker.class).all;
             self.close(ground, kept, at, mask, walker.owner, time, step);

@@ -166,6 +166,27 @@ fn what_the_user_wants_grasped_first_is_waited_for() {
     }
 }
 
+/// A robot that stands beside the lattice is given a step more room, unless there is no plan then:
+/// the goal here is right beside a robot in its dead end.
+#[test]
+fn where_there_is_no_plan_with_room_to_spare_there_is_one_without() {
+    let homes = [[0.25, 0.25], [2.75, 0.25]];
+    let trips = [([2.25, 0.25], Some([0.75, 0.25]))];
+    let mut draft = draft([0.0, 0.0, 3.0, 0.5], &[], &homes, &trips);
+    draft.objects[0].grasp = [0.0, 0.0];
+    draft.objects[0].pass_under = true;
+    let mut run = Run::of(scene_of(draft));
+    let beside = &mut run.world.robots[1].position;
+    beside.x -= 0.01;
+    let lattice = &run.scene.lattice;
+    assert!(lattice.exact && lattice.cell(scene::vec(*beside)).is_none());
+    run.settle();
+    let actions = (0..2).flat_map(|robot| run.schedule.actions_of(robot));
+    let grips = actions.map(|action| action.grip);
+    let grips: Vec<_> = grips.filter(|grip| *grip != Grip::Keep.code()).collect();
+    assert_eq!(grips, [Grip::Grasp.code(), Grip::Release.code()]);
+}
+
 /// A planner that takes long while robots go on: each plan keeps what was listed of the one before.
 #[test]
 fn of_a_plan_that_keeps_what_was_listed_every_action_moves_or_grips() {

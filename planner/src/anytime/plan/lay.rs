@@ -20,6 +20,7 @@ impl Plan {
     pub(super) fn lay(&mut self, ground: &Ground, start: &Start) {
         self.timeline.clear();
         self.tracks.clone_from(&start.robots);
+        self.excuse_starts(ground);
         for (robot, track) in self.tracks.iter().enumerate() {
             if !track.is_gone {
                 enter(&mut self.timeline, ground, robot as Owner, track);
@@ -58,6 +59,22 @@ impl Plan {
                 turns: self.rests[object].turns,
                 place: Rc::clone(&self.rests[object].place),
             });
+        }
+    }
+
+    /// Robots can be where they stand at first, also where that counts as too near to others.
+    fn excuse_starts(&mut self, ground: &Ground) {
+        let live = || (self.tracks.iter().enumerate()).filter(|(_, track)| !track.is_gone);
+        for (robot, track) in live() {
+            for (other, near) in live().filter(|(other, _)| *other != robot) {
+                for class in classes_at_start(ground, track) {
+                    let meets = |as_class| ground.meet(class, track.start, as_class, near.start);
+                    if classes_at_start(ground, near).any(meets) {
+                        let owner = other as Owner;
+                        self.timeline.excuse(class, track.start, owner, near.start);
+                    }
+                }
+            }
         }
     }
 
@@ -120,6 +137,16 @@ impl Plan {
         };
         self.lay(ground, &whole);
     }
+}
+
+/// The classes of a robot where it begins: alone, and with what it puts down first.
+fn classes_at_start(ground: &Ground, track: &Track) -> impl Iterator<Item = usize> {
+    let first = track.deeds.first().zip(track.stops.first());
+    let held = first.and_then(|(deed, place)| match *deed {
+        Deed::Released(object, _) => Some(ground.carrying(object as usize, place.by)),
+        _ => None,
+    });
+    std::iter::once(ROBOT_ALONE.0).chain(held)
 }
 
 /// Enters all that a robot does.

@@ -7,6 +7,7 @@ use super::*;
 use crate::anytime::ground::duration;
 use crate::anytime::keep::kept;
 use crate::anytime::plan::lay::enter;
+use crate::anytime::publish::Script;
 use crate::anytime::route::sides;
 use crate::anytime::timeline::Timeline;
 use crate::anytime::track::{Deed, grips_in_turn};
@@ -206,6 +207,112 @@ fn who_is_parked_in_the_way_makes_room_and_goes_home_after_that() {
     assert_eq!([carries(&tracks[0]), carries(&tracks[1])], [false, true]);
     assert!(!tracks[0].deeds.is_empty());
     assert!((0..2).all(|robot| solver.plan.ends_at_home(robot)));
+}
+
+/// A first plan for a room in which robots stand elsewhere than at home, in these columns and rows
+/// from below, if that is said; with or without margins.
+fn planned_from(rows: &[&'static str], at: &[[u8; 2]], needs_margins: bool) -> (Scene, Solver) {
+    let scene = cells(rows);
+    let mut situation = Situation {
+        needs_margins,
+        ..Situation::at_start(&scene)
+    };
+    for (robot, at) in situation.robots.iter_mut().zip(at) {
+        robot.at = Vec2::from(at.map(|cell| f64::from(cell) + 0.5));
+    }
+    let mut solver = Solver::new(&scene, &Settings::default(), &situation).unwrap();
+    solver.first(&scene, 0).unwrap();
+    (scene, solver)
+}
+
+#[test]
+fn who_stands_too_close_to_another_at_first_can_still_move() {
+    let rows = ["aA....Bb", "........", "1......2"];
+    let (_, solver) = planned_from(&rows, &[[3, 2], [4, 2]], true);
+    let carries = |track: &Track| track.grips().count() == 2;
+    assert!(solver.plan.tracks().iter().all(carries));
+    assert!((0..2).all(|robot| solver.plan.ends_at_home(robot)));
+}
+
+/// Also where robots stand too close to each other at first.
+#[test]
+fn no_plan_has_robots_wait_for_one_another_in_a_ring() {
+    let rows = ["a.A...B.b", ".........", "d...C...c", "3.4...1.2"];
+    let together = [[3, 2], [4, 2], [4, 1]];
+    let mut improved = 0;
+    for turn in 0..3 {
+        let mut at = together;
+        at.rotate_left(turn);
+        let (scene, mut solver) = planned_from(&rows, &at, true);
+        for _ in 0..100 {
+            improved += u32::from(solver.improve(&scene));
+            let tracks = solver.plan.tracks().to_vec();
+            let (ground, start) = (&solver.ground, &solver.start);
+            solver.plan.take_over(ground, start, tracks);
+            let situation = Situation::at_start(&scene);
+            let script = Script::of(&scene, ground, &solver.plan, &situation);
+            assert!(comes_to_its_end(&script, scene.homes.len()), "{at:?}");
+        }
+    }
+    assert!(improved > 0);
+}
+
+/// Whether robots get through all of it, each action as soon as what it waits for is granted.
+fn comes_to_its_end(script: &Script, robots: usize) -> bool {
+    let mut granted = vec![0; robots];
+    let mut progress = true;
+    while progress {
+        progress = false;
+        for robot in 0..robots {
+            let is_free = |action: u32| {
+                let mut waits = script.waits(robot, action as usize).iter();
+                waits.all(|wait| granted[wait.robot as usize] >= wait.actions)
+            };
+            if granted[robot] < script.listable(robot) && is_free(granted[robot]) {
+                granted[robot] += 1;
+                progress = true;
+            }
+        }
+    }
+    (0..robots).all(|robot| granted[robot] == script.listable(robot))
+}
+
+#[test]
+fn robots_that_need_margins_stay_a_step_further_apart() {
+    let crossing = ["A......B", "a......b", "2......1"];
+    let (_, plain) = planned_from(&crossing, &[], false);
+    assert_eq!(least_distance(&plain), 1, "they pass each other closely");
+    let (_, wide) = planned_from(&crossing, &[], true);
+    assert!(least_distance(&wide) >= 2);
+}
+
+/// How many columns or rows two robots are apart at the least, at any time.
+fn least_distance(solver: &Solver) -> i32 {
+    let [one, other] = [0, 1].map(|robot| visits(solver, robot));
+    let pairs = one
+        .iter()
+        .flat_map(|mine| other.iter().map(move |theirs| (mine, theirs)));
+    let meeting = pairs.filter(|(mine, theirs)| mine.1 < theirs.2 && theirs.1 < mine.2);
+    let far = meeting.map(|(mine, theirs)| {
+        let (dx, dy) = solver.ground.offset(mine.0, theirs.0);
+        dx.abs().max(dy.abs())
+    });
+    far.min().unwrap()
+}
+
+/// Which points a robot is at, or on its way from or to, from when to when.
+fn visits(solver: &Solver, robot: usize) -> Vec<(u32, Time, Time)> {
+    let track = &solver.plan.tracks()[robot];
+    let mut visits = vec![(track.start, 0, EVER)];
+    for deed in &track.deeds {
+        if let Deed::Step(direction, depart, arrive) = *deed {
+            let (cell, _, until) = visits.last_mut().unwrap();
+            *until = arrive;
+            let next = cell.wrapping_add_signed(solver.ground.offsets[direction as usize]);
+            visits.push((next, depart, EVER));
+        }
+    }
+    visits
 }
 
 #[test]
