@@ -11,7 +11,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 use crate::capacity::{MAX_ACTIONS, MAX_ROBOTS, MAX_WAITS};
 use crate::id::tag;
-use crate::{NONE, Point, StateHash};
+use crate::{Checked, Counts, NONE, Point, StateHash, zeroed};
 
 tag! {
     /// Why the world refuses a schedule.
@@ -177,4 +177,33 @@ impl Schedule {
         hash.add(&self.actions[..self.action_count as usize]);
         hash.add(&self.waits[..self.wait_count as usize]);
     }
+
+    /// As a planner process writes it down for the next one: the message as it is in memory, and
+    /// its hash.
+    #[must_use]
+    pub fn sealed(&self) -> Vec<u8> {
+        let message = self.as_bytes();
+        [message, &seal_of(message).to_ne_bytes()].concat()
+    }
+
+    /// What was written down; `None` if that is not all there as it was written, or no legal
+    /// schedule of a scene with `counts`.
+    #[must_use]
+    pub fn unsealed(bytes: &[u8], counts: Counts) -> Option<Box<Self>> {
+        let (message, seal) = bytes.split_last_chunk()?;
+        let mut schedule: Box<Self> = zeroed();
+        let room = schedule.as_mut_bytes();
+        if message.len() != room.len() || u64::from_ne_bytes(*seal) != seal_of(message) {
+            return None;
+        }
+        room.copy_from_slice(message);
+        Checked::new(&*schedule, counts).ok()?;
+        Some(schedule)
+    }
+}
+
+fn seal_of(message: &[u8]) -> u64 {
+    let mut hash = StateHash::new();
+    hash.add(message);
+    hash.finish()
 }

@@ -194,6 +194,9 @@ impl<'s> Disturbed<'s> {
             }
             (Kind::PlannerCrash, _) if self.office.planner.is_some() => {
                 self.office.die(back_at);
+                if let Some(damage) = fault.damage() {
+                    self.office.damage(damage, self.scene.counts());
+                }
                 for station in &mut self.stations {
                     station.requests.clear();
                 }

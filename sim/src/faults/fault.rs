@@ -191,6 +191,27 @@ pub struct Fault {
     pub share: u32,
 }
 
+/// What becomes of the schedule that a planner's process has written down for the next one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Damage {
+    /// So much of it is left.
+    CutOff { percent: usize },
+    /// A byte is another one.
+    Altered { at: usize },
+}
+
+impl Fault {
+    /// What it damages beside a planner's process: nothing in three of four cases.
+    pub(crate) const fn damage(&self) -> Option<Damage> {
+        let share = self.share as usize;
+        match (self.kind, share % 8) {
+            (Kind::PlannerCrash, 0) => Some(Damage::CutOff { percent: share }),
+            (Kind::PlannerCrash, 4) => Some(Damage::Altered { at: share }),
+            _ => None,
+        }
+    }
+}
+
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
@@ -218,6 +239,9 @@ impl fmt::Display for Fault {
             }
             (Kind::WorldCrash, None) => write!(f, ", {whom}"),
             (Kind::ClockJump, None) => write!(f, ", {whom}, {ticks} ticks back"),
+            (Kind::PlannerCrash, None) if self.damage().is_some() => {
+                write!(f, ", {whom}, {ticks} ticks, what it left is damaged")
+            }
             (_, None) => write!(f, ", {whom}, {ticks} ticks"),
         }
     }
@@ -422,6 +446,12 @@ mod tests {
         assert_eq!(
             [0, 1].map(|share| told(Kind::ClockJump, share)),
             [ahead, back]
+        );
+        let damaged = "#3 tick 40: planner-crash, the world, 5 ticks, what it left is damaged";
+        let whole = "#3 tick 40: planner-crash, the world, 5 ticks";
+        assert_eq!(
+            [0, 4, 6].map(|share| told(Kind::PlannerCrash, share)),
+            [damaged, damaged, whole]
         );
         let torn = "#3 tick 40: world-crash, the world, in the middle of its journal";
         let whole = "#3 tick 40: world-crash, the world";

@@ -8,12 +8,12 @@ use std::rc::Rc;
 
 use planner::{Planner, PlannerInput};
 use shm_types::{
-    ConstraintTable, HardRequest, PlannerReport, Schedule, Versioned, WorldSnapshot, zeroed,
+    ConstraintTable, Counts, HardRequest, PlannerReport, Schedule, Versioned, WorldSnapshot, zeroed,
 };
 use world::FIRST_INCARNATION;
 
 use super::driver::Disturbed;
-use super::fault::{Channel, Kind, Whom};
+use super::fault::{Channel, Damage, Kind, Whom};
 use super::line::Line;
 use super::station::{Inbox, Shared, Shot};
 use crate::simulation::checked;
@@ -36,7 +36,8 @@ pub(crate) struct Office {
     pub(crate) schedules: Inbox<Schedule>,
     pub(crate) table_history: VecDeque<Shared<ConstraintTable>>,
     pub(crate) schedule_history: VecDeque<Shared<Schedule>>,
-    /// The newest schedule, as a planner process writes it down for the next one.
+    /// The newest schedule, as a planner process writes it down for the next one; none if that
+    /// cannot be read.
     pub(crate) published: Option<Shared<Schedule>>,
 }
 
@@ -56,6 +57,18 @@ impl Office {
             table_history: VecDeque::new(),
             schedule_history: VecDeque::new(),
             published: None,
+        }
+    }
+
+    /// What the process has written down is damaged.
+    pub(crate) fn damage(&mut self, damage: Damage, counts: Counts) {
+        if let Some(published) = self.published.take() {
+            let mut bytes = published.sealed();
+            match damage {
+                Damage::CutOff { percent } => bytes.truncate(bytes.len() * percent / 100),
+                Damage::Altered { at } => bytes[at] ^= u8::MAX,
+            }
+            self.published = Schedule::unsealed(&bytes, counts).map(Rc::new);
         }
     }
 

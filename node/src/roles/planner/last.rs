@@ -3,14 +3,13 @@
 //! Responsible for: a file that is whole whenever a process dies.
 //! Not responsible for: what the next process does with it (crate `planner`).
 //!
-//! It holds the message as it is in memory: it is read by the program that wrote it, on the same
-//! machine. Where it cannot be read the next process plans anew.
+//! It is read by the program that wrote it, on the same machine. Where it cannot be read the next
+//! process plans anew.
 
 use std::fs;
 use std::path::PathBuf;
 
-use shm_types::{Checked, Counts, Schedule, zeroed};
-use zerocopy::IntoBytes;
+use shm_types::{Counts, Schedule};
 
 use crate::domain::{self, DomainError};
 
@@ -33,18 +32,10 @@ impl LastSchedule {
         }
     }
 
-    /// The one that an earlier process has left; `None` if there is none, or what there is, is no
-    /// legal schedule of a scene with `counts`.
+    /// The one that an earlier process has left; `None` if there is none, or what there is was
+    /// damaged or is no legal schedule of a scene with `counts`.
     pub(super) fn read(&self, counts: Counts) -> Option<Box<Schedule>> {
-        let bytes = fs::read(&self.path).ok()?;
-        let mut schedule: Box<Schedule> = zeroed();
-        let room = schedule.as_mut_bytes();
-        if bytes.len() != room.len() {
-            return None;
-        }
-        room.copy_from_slice(&bytes);
-        Checked::new(&*schedule, counts).ok()?;
-        Some(schedule)
+        Schedule::unsealed(&fs::read(&self.path).ok()?, counts)
     }
 
     /// Writes `schedule` down in the place of the one before, once for each version.
@@ -56,7 +47,7 @@ impl LastSchedule {
             return Ok(());
         }
         self.version = schedule.version;
-        let written = domain::put(&self.path, schedule.as_bytes());
+        let written = domain::put(&self.path, &schedule.sealed());
         let had_failed = std::mem::replace(&mut self.has_failed, written.is_err());
         if had_failed { Ok(()) } else { written }
     }
@@ -64,7 +55,7 @@ impl LastSchedule {
 
 #[cfg(test)]
 mod tests {
-    use shm_types::RobotSchedule;
+    use shm_types::{RobotSchedule, zeroed};
 
     use super::*;
 
@@ -94,9 +85,21 @@ mod tests {
         };
         last.write(&schedule).unwrap();
         assert!(last.read(COUNTS).is_none(), "it lists what is not there");
+        schedule.version = 6;
+        schedule.robots[1] = RobotSchedule::default();
+        last.write(&schedule).unwrap();
         let bytes = fs::read(&last.path).unwrap();
-        fs::write(&last.path, &bytes[..bytes.len() - 1]).unwrap();
-        assert!(last.read(COUNTS).is_none(), "it is cut off");
+        for length in [0, 7, bytes.len() / 2, bytes.len() - 1] {
+            fs::write(&last.path, &bytes[..length]).unwrap();
+            assert!(last.read(COUNTS).is_none(), "{length} bytes are left");
+        }
+        // The tick from which it holds: whatever is written there is legal.
+        let mut altered = bytes.clone();
+        altered[std::mem::offset_of!(Schedule, effect_tick) + 5] ^= 1;
+        fs::write(&last.path, &altered).unwrap();
+        assert!(last.read(COUNTS).is_none(), "it holds from another tick");
+        fs::write(&last.path, &bytes).unwrap();
+        assert!(last.read(COUNTS).is_some());
     }
 
     #[test]
