@@ -61,29 +61,43 @@ struct Mode {
     makes_room: bool,
     /// A robot may end elsewhere than at home, until the last move is made.
     leaves_away: bool,
+    /// Robots go home before the first move is made, where they can: what is put down may leave them
+    /// no way. Who gets a move does not go.
+    home_first: bool,
 }
 
+const PLAIN: Mode = Mode {
+    in_turn: false,
+    makes_room: false,
+    leaves_away: false,
+    home_first: false,
+};
+const PATIENT: Mode = Mode {
+    in_turn: true,
+    makes_room: true,
+    ..PLAIN
+};
+
 /// The ways to make a first plan, in the order in which they are tried.
-const MODES: [Mode; 4] = [
+const MODES: [Mode; 6] = [
+    PLAIN,
+    PATIENT,
     Mode {
-        in_turn: false,
-        makes_room: false,
-        leaves_away: false,
-    },
-    Mode {
-        in_turn: true,
-        makes_room: true,
-        leaves_away: false,
-    },
-    Mode {
-        in_turn: false,
-        makes_room: false,
         leaves_away: true,
+        ..PLAIN
     },
     Mode {
-        in_turn: true,
-        makes_room: true,
         leaves_away: true,
+        ..PATIENT
+    },
+    Mode {
+        home_first: true,
+        ..PLAIN
+    },
+    Mode {
+        leaves_away: true,
+        home_first: true,
+        ..PATIENT
     },
 ];
 
@@ -261,8 +275,13 @@ impl Solver {
         let hops = Hops::new(scene, &mut self.ground, &self.start, &self.homes, sequence)?;
         let objects: Vec<u32> = sequence.iter().map(|(object, _)| *object as u32).collect();
         let mut found = None;
+        let is_away = |(track, home): (&Track, &u32)| !track.is_gone && track.free.0 != *home;
+        let is_any_away = self.start.robots.iter().zip(&self.homes).any(is_away);
         self.router.is_hasty = true;
         for mode in MODES {
+            if mode.home_first && !is_any_away {
+                break;
+            }
             self.mode = mode;
             self.known.clear();
             found = self.greedy(scene, &hops, &objects);
@@ -312,6 +331,9 @@ impl Solver {
         self.decoded += 1;
         self.plan.begin(&self.ground, &self.start);
         self.plan.leaves_away = self.mode.leaves_away;
+        if self.mode.home_first {
+            self.send_all_home();
+        }
         if !self.mode.makes_room {
             self.known.begin();
         }

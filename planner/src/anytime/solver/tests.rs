@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use scene::Vec2;
+
 use super::testing::{cells, planned, solver_of, written};
 use super::*;
 use crate::anytime::ground::duration;
@@ -313,6 +315,19 @@ fn visits(solver: &Solver, robot: usize) -> Vec<(u32, Time, Time)> {
         }
     }
     visits
+}
+
+/// What the other one puts down would leave it no way.
+#[test]
+fn a_robot_that_is_away_from_home_goes_home_in_time() {
+    let mut draft = cells(&["..1....B", "####.a.A"]).draft().clone();
+    draft.objects[0].pass_under = false;
+    let scene = Scene::new(draft).unwrap();
+    let mut situation = Situation::at_start(&scene);
+    situation.robots[1].at = Vec2::new(0.5, 1.5);
+    let mut solver = Solver::new(&scene, &Settings::default(), &situation).unwrap();
+    assert!(solver.first(&scene, 0).is_some());
+    assert!((0..2).all(|robot| solver.plan.ends_at_home(robot)));
 }
 
 #[test]
