@@ -192,6 +192,7 @@ impl Bench {
 fn it_claims_looks_and_asks_for_a_tenth_of_a_metre_in_its_first_step() {
     let mut bench = Bench::new(Method::GraspingAndRestricted);
     assert_eq!(bench.step(), None);
+    assert!(bench.robot.cycle().is_empty(), "one task is in no ring");
     assert_eq!(
         (bench.command.claim.task, bench.command.claim.epoch),
         (0, 1)
@@ -299,6 +300,10 @@ fn objects_in_the_way_fail_the_task_at_once_and_the_planner_is_asked() {
     assert_eq!(bench.command.failure.blocker, NONE);
     bench.tick();
     assert_eq!(bench.step(), None, "it does not ask every tick");
+    assert_eq!(
+        bench.command.claim.task, 0,
+        "nobody else takes it meanwhile"
+    );
 
     let answer = HardAnswer {
         robot: 0,
@@ -342,6 +347,53 @@ fn objects_in_the_way_fail_the_task_at_once_and_the_planner_is_asked() {
         bench.command.settled_at_change,
         bench.snapshot.header.change
     );
+}
+
+/// The planner knows a failure by its number, and has answered that of the version before.
+#[test]
+fn failures_are_numbered_on_in_another_version_of_the_scene() {
+    let mut bench = Bench::new(Method::GraspingAndRestricted);
+    bench.put_object_1(DOORWAY);
+    assert_eq!(bench.step().unwrap().failure, 1);
+    bench.robot.enter(&bench.scene);
+    bench.tick();
+    bench.open_epoch();
+    assert_eq!(bench.step().map(|asked| asked.failure), Some(2));
+}
+
+/// The robot where it grasps object 0, in a room where grips take that long.
+fn at_its_grasp(grasp_s: f64) -> Bench {
+    let mut draft = scene::parse(ROOMS, "rooms").unwrap().draft().clone();
+    draft.robot.grasp_s = grasp_s;
+    let mut bench = Bench::of(Scene::new(draft).unwrap(), Method::GraspingAndRestricted);
+    let object = &bench.scene.objects[0];
+    let at = point(object.start + object.grasp);
+    let me = &mut bench.snapshot.robots[0];
+    (me.position, me.epoch_position) = (at, at);
+    bench
+}
+
+#[test]
+fn a_grip_that_takes_longer_than_it_waits_before_it_looks_again_is_left_alone() {
+    let mut bench = at_its_grasp(5.0);
+    bench.run_until(1);
+    let plans = bench.plans();
+    bench.run_until(4);
+    assert_eq!((bench.phase(), bench.plans()), (Phase::Grasping, plans));
+    assert_eq!(bench.command.grip, Grip::Grasp.code());
+}
+
+#[test]
+fn only_a_grip_that_takes_no_time_leaves_the_way_found_before_it_good() {
+    for (grasp_s, looks) in [(0.0, 0), (5.0, 1)] {
+        let mut bench = at_its_grasp(grasp_s);
+        bench.run_until(1);
+        let plans = bench.plans();
+        bench.let_it_hold();
+        bench.step();
+        assert_eq!(bench.phase(), Phase::Transfer);
+        assert_eq!(bench.plans() - plans, looks, "{grasp_s} s");
+    }
 }
 
 #[test]
@@ -519,4 +571,28 @@ fn private_state_shows_in_the_hash() {
         seen.push(bench.command.state_hash);
         bench.tick();
     }
+}
+
+/// Two robots that have been told the same but for one thing, which both keep.
+#[test]
+fn what_phase_it_is_in_since_when_and_what_it_has_asked_for_show_in_the_hash() {
+    let hash = |change: fn(&mut WorldSnapshot), at_grasp: bool| {
+        let mut bench = if at_grasp {
+            at_its_grasp(5.0)
+        } else {
+            Bench::new(Method::GraspingAndRestricted)
+        };
+        change(&mut bench.snapshot);
+        bench.step();
+        (bench.phase(), bench.command.state_hash)
+    };
+    let as_it_is: fn(&mut WorldSnapshot) = |_| {};
+    let later: fn(&mut WorldSnapshot) = |snapshot| snapshot.header.time_ns += 10_000_000;
+    let (phase, since) = hash(as_it_is, true);
+    assert_eq!(phase, Phase::Grasping);
+    assert_ne!(since, hash(later, true).1);
+    let asked: fn(&mut WorldSnapshot) = |snapshot| snapshot.robots[0].request = 1;
+    let (phase, first) = hash(as_it_is, false);
+    assert_eq!(phase, Phase::Transit);
+    assert_ne!(first, hash(asked, false).1);
 }

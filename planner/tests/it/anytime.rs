@@ -2,7 +2,7 @@
 
 use planner::{Planner, PlannerInput};
 use scene::{Event, Method, Scene, Settings, UserOrder};
-use shm_types::{Activity, Grip, PlannerReport, Schedule, WorldSnapshot, zeroed};
+use shm_types::{Activity, Counters, Grip, PlannerReport, Schedule, WorldSnapshot, zeroed};
 
 use crate::room::{checked, draft, scene_of, shipped, start};
 
@@ -95,6 +95,18 @@ fn what_is_done_at_once_is_paid_for_step_by_step() {
             .collect::<Vec<_>>()
     };
     assert_eq!(listed(&whole), listed(&sliced));
+}
+
+#[test]
+fn without_work_units_nothing_is_done() {
+    let mut run = Run::of(shipped("swap"));
+    for _ in 0..10 {
+        assert!(!run.step(0));
+    }
+    assert_eq!(
+        (run.report.counters, run.report.busy),
+        (Counters::default(), 1)
+    );
 }
 
 #[test]

@@ -297,7 +297,7 @@ fn the_best_of_several_grasps_is_what_bounds_and_r_take() {
     let room = corridor(&[(0, 0), (-1, 0)], &[(4, 0)], &[(5, 0)], false);
     let found = bounds(&room);
     assert_eq!(room.least_steps(true), Some(4));
-    for bound_s in [found.best_s(), found.r_s().unwrap()] {
+    for bound_s in [found.longest_task_s, found.best_s(), found.r_s().unwrap()] {
         assert!((bound_s - 4.0).abs() < 1e-3, "{found:?}");
     }
     let below = bounds(&corridor(&[(0, 0)], &[(4, 0)], &[(5, 0)], false));

@@ -153,6 +153,21 @@ fn a_task_that_cannot_be_done_alone_gives_no_constraint() {
     }
 }
 
+/// The robot comes down a dead end before its object, which then shuts it in.
+#[test]
+fn a_task_after_which_nobody_gets_home_cannot_be_done() {
+    let walls = [[0.0, 0.0, 0.75, 1.5], [1.25, 0.0, 2.0, 1.5]];
+    let trips = [([1.0, 2.6], Some([1.0, 0.7]))];
+    let homes = [[0.3, 1.8], [1.7, 1.8]];
+    let scene = room([0.0, 0.0, 2.0, 3.0], &walls, &homes, &trips);
+    let settings = settings(Method::Restricted, HardMode::Cached);
+    let mut hard = HardConstraints::new(&scene, &settings);
+    let (found, counters) = work(&mut hard, &scene, &start(&scene), Some(0), u64::MAX);
+    assert_eq!((found.new, found.infeasible), (0, true));
+    // From one of the homes, the transfer, and to each of them.
+    assert_eq!(counters.path_plans, 1 + 1 + 2);
+}
+
 /// Five objects in two rooms with a narrow door: easy and hard constraints of all sorts.
 fn crowded() -> Scene {
     let walls = [[2.4, 0.0, 2.6, 1.2], [2.4, 2.2, 2.6, 3.4]];

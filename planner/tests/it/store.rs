@@ -142,6 +142,14 @@ fn a_failure_teaches_the_part_of_it_that_matters() {
         None
     );
     assert_eq!(store.constraints().len(), before);
+    // It is news to one that has not searched.
+    let mut empty = Store::of(&scene, 0);
+    let news = empty.learn(&scene, &mut ways, Leg::Transfer(2), &start);
+    let (known, of_three) = (&store.constraints()[0], |found: &Constraint| {
+        found.task == 2
+    });
+    assert!(of_three(known) && news == Some(known));
+    assert_eq!(empty.constraints(), store.constraints());
     let removal = ways.removal(&scene, Leg::Transfer(2), &start).unwrap();
     assert_eq!(removal.placements, [at(1, false)]);
 }

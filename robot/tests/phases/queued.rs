@@ -52,6 +52,15 @@ fn who_waits_in_the_queue_for_too_long_names_the_robot_that_is_nearest() {
     let failure = bench.command.failure;
     assert_eq!((failure.id, failure.blocker), (1, 2));
     assert_eq!(failure.cause, FailureCause::Robots.code());
+    // And not the one that is nearer to the corner from which places count.
+    let mut bench = three();
+    bench.grants = false;
+    bench.snapshot.robots[0].position = Point::new(1.5, 1.5);
+    bench.snapshot.robots[1].position = Point::new(0.3, 0.3);
+    bench.snapshot.robots[2].position = Point::new(1.5, 2.7);
+    bench.run_until(7);
+    let failure = bench.command.failure;
+    assert_eq!((failure.id, failure.blocker), (1, 2));
 }
 
 /// Robot 1 is beside the way, with an object on its far side; it is robot 2 that is in the doorway.

@@ -91,6 +91,17 @@ fn what_it_finds_can_be_carried_out_move_by_move() {
     }
 }
 
+/// Steps are smaller than bodies: on its way under the object a robot is in its room for several.
+#[test]
+fn who_comes_for_an_object_from_below_may_go_on_in_its_room() {
+    let mut draft = cells(&["A.b.2", "a1..."]).draft().clone();
+    draft.objects[1].pass_under = false;
+    draft.objects[1].start[0] += 0.5;
+    let scene = Scene::new(draft).unwrap();
+    assert!(scene.lattice.pitch_m <= 0.5 && scene.lifts_from_below(1));
+    assert!(matches!(search(&scene).0, Found::Plan(_)));
+}
+
 #[test]
 fn where_there_is_no_plan_it_comes_to_an_end() {
     // Two objects that would have to change places, and one shut off.

@@ -3,28 +3,73 @@
 use scene::Settings;
 
 use super::*;
+use crate::anytime::plan::Plan;
 use crate::anytime::situation::Situation;
 use crate::anytime::solver::testing::cells;
+use crate::anytime::track::grips_in_turn;
 
-/// The number of steps of a shortest plan with fewer than `most`; none if there is none.
-fn least(rows: &[&'static str], most: u32) -> Option<usize> {
-    let scene = cells(rows);
-    let ground = Ground::new(&scene, &Settings::default(), Vec::new());
-    let start = Start::new(&scene, &ground, &Situation::at_start(&scene)).unwrap();
+/// A shortest plan with fewer than `most` steps, laid out, and how many it has; none if there is
+/// none.
+fn shortest(scene: &Scene, most: u32) -> Option<(Plan, usize)> {
+    let ground = Ground::new(scene, &Settings::default(), Vec::new());
+    let start = Start::new(scene, &ground, &Situation::at_start(scene)).unwrap();
     let goals: Vec<_> = (scene.objects.iter().enumerate())
-        .map(|(object, spec)| Some(Place::of(&scene, &ground, object, spec.goal?)))
+        .map(|(object, spec)| Some(Place::of(scene, &ground, object, spec.goal?)))
         .collect();
     let homes: Vec<u32> = start.robots.iter().map(|track| track.start).collect();
     let known = most * duration(0);
-    let mut shortest = Shortest::new(&scene, &ground, &start, &homes, &goals, known).unwrap();
+    let mut shortest = Shortest::new(scene, &ground, &start, &homes, &goals, known).unwrap();
     loop {
         match shortest.advance(&ground, 100) {
             Least::Open => {}
-            Least::Plan(steps) => return Some(steps.len()),
+            Least::Plan(steps) => {
+                let mut plan = Plan::new(&ground, homes);
+                plan.replay(scene, &ground, &start, &steps);
+                return Some((plan, steps.len()));
+            }
             Least::NoneShorter => return None,
             Least::TooMany => panic!("there are few configurations"),
         }
     }
+}
+
+/// The number of its steps.
+fn least(rows: &[&'static str], most: u32) -> Option<usize> {
+    shortest(&cells(rows), most).map(|(_, steps)| steps)
+}
+
+#[test]
+fn its_steps_bring_robots_home_and_objects_to_their_goals() {
+    for (rows, robots) in [(["A.a1...2b.B"], 2), (["Aa1B..b2..C"], 3)] {
+        let scene = cells(&rows);
+        let (plan, _) = shortest(&scene, 20).unwrap();
+        assert!(
+            (0..robots).all(|robot| plan.ends_at_home(robot)),
+            "{rows:?}"
+        );
+        let mut brought = 0;
+        for grip in grips_in_turn(plan.tracks())
+            .iter()
+            .filter(|grip| grip.is_release)
+        {
+            let goal = scene.objects[grip.object].goal.unwrap();
+            assert!((grip.place.at - goal).norm() < 1e-9, "{rows:?}");
+            brought += 1;
+        }
+        assert_eq!(brought, scene.objects.len());
+    }
+}
+
+/// Straight down through the object it would be two steps to where it is grasped.
+#[test]
+fn nobody_passes_through_an_object_that_is_not_to_be_passed_under() {
+    let mut draft = cells(&["..A..", "..a.1", "....."]).draft().clone();
+    draft.objects[0].pass_under = false;
+    draft.objects[0].grasp = [0.0, -1.0];
+    let scene = Scene::new(draft).unwrap();
+    // Four there, two with the object, four back, two grips.
+    let steps = |most| shortest(&scene, most).map(|(_, steps)| steps);
+    assert_eq!((steps(13), steps(12)), (Some(12), None));
 }
 
 #[test]

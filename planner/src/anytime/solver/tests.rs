@@ -56,6 +56,27 @@ fn what_is_reserved_after_many_changes_is_what_robots_do_in_the_end() {
     }
 }
 
+#[test]
+fn an_object_keeps_others_away_from_when_its_grip_begins_to_open() {
+    let (_, mut solver, _) = planned(&scene::GenerateOptions::default());
+    solver.restore().unwrap();
+    let (ground, tracks) = (&solver.ground, solver.plan.tracks());
+    let mut releases = 0;
+    for grip in grips_in_turn(tracks).iter().filter(|grip| grip.is_release) {
+        let owner = (tracks.len() + grip.object) as u32;
+        for (class, cells) in grip.place.cells.iter().enumerate() {
+            for &cell in cells {
+                let busy = solver.plan.timeline().busy(class, cell).iter();
+                let mut own = busy.filter(|busy| busy.owner == owner);
+                let opens = grip.time - ground.release;
+                assert!(own.any(|busy| busy.from == opens));
+            }
+        }
+        releases += 1;
+    }
+    assert!(releases > 0);
+}
+
 /// What is kept waits for nothing that is planned later: so it has to come first. And nothing is
 /// planned for a time that will be over.
 #[test]
@@ -330,6 +351,38 @@ fn a_robot_that_is_away_from_home_goes_home_in_time() {
     assert!((0..2).all(|robot| solver.plan.ends_at_home(robot)));
 }
 
+/// The first can go home only after the second has.
+#[test]
+fn who_has_no_way_home_yet_is_sent_after_the_others() {
+    let scene = cells(&["A....a1", "#B#####"]);
+    let mut situation = Situation::at_start(&scene);
+    situation.robots[0].at = Vec2::new(2.5, 1.5);
+    situation.robots[1].at = Vec2::new(1.5, 1.5);
+    let mut solver = Solver::new(&scene, &Settings::default(), &situation).unwrap();
+    solver.begin();
+    assert!(solver.send_all_home().is_some());
+    assert!((0..2).all(|robot| solver.plan.ends_at_home(robot)));
+}
+
+/// What lies about is first in the list of objects, and in the way.
+#[test]
+fn what_has_no_goal_may_be_set_aside_too() {
+    let mut draft = cells(&["A.ba.2", ".####.", ".####.", ".####.", ".....1"])
+        .draft()
+        .clone();
+    draft.objects[0].goal = None;
+    let scene = Scene::new(draft).unwrap();
+    let mut solver = solver_of(&scene);
+    solver.first(&scene, 0).unwrap();
+    let mut aside = 0;
+    for _ in 0..200 {
+        solver.improve(&scene);
+        let moves = solver.plan.tracks().iter().flat_map(Track::grips);
+        aside += moves.filter(|grip| grip.object == 0).count();
+    }
+    assert!(aside > 0, "it is never tried");
+}
+
 #[test]
 fn a_robot_that_puts_something_down_from_below_gets_out_from_under_it() {
     let mut draft = cells(&["A...", ".a.1", "...."]).draft().clone();
@@ -352,6 +405,8 @@ fn what_is_looked_for_is_counted_and_charged() {
     // Eight steps and two grips at least.
     assert!(expanded >= 10, "{expanded}");
     assert!(solver.units() >= UNITS_PER_INTERVAL * expanded + solver.sequencer.cells);
+    // A cell takes a unit at least.
+    assert!((expanded..=solver.units()).contains(&solver.cells()));
 }
 
 #[test]
