@@ -17,6 +17,8 @@ use node::Role;
 use node::domain::RunFile;
 use node::supervisor::{DIARY_FILE, Entry, Happened};
 use serde_json::Value;
+use shm_types::capacity::MAX_OBJECTS;
+use shm_types::{Counts, Schedule};
 use tempfile::TempDir;
 
 use live::{binary, finish, wait_until};
@@ -371,6 +373,40 @@ fn a_robot_that_was_added_is_started_again_as_the_others_are() {
     let result = assert_solved(&mut run);
     assert_eq!(result["robots"], 3);
     assert_eq!(result["counts"]["scene_changes"], 1);
+}
+
+/// The newest schedule in the run's directory.
+fn last_schedule(run: &Run) -> Option<Box<Schedule>> {
+    let counts = Counts {
+        robots: 3,
+        objects: MAX_OBJECTS as u32,
+    };
+    Schedule::unsealed(&fs::read(run.directory.join("schedule")).ok()?, counts)
+}
+
+#[test]
+fn a_planner_that_dies_after_the_scene_was_changed_leaves_robots_to_its_plan() {
+    let mut run = Run::start(&SLOW);
+    let (status, words) = run.say(&["tell", "add-robot", "3.5", "0.5"]);
+    assert_eq!(status, 0, "{words}");
+    let mut version = 0;
+    wait_until("a whole plan for three robots", || {
+        let last = last_schedule(&run);
+        last.is_some_and(|last| {
+            let listed = &last.robots[..last.robot_count as usize];
+            version = last.version;
+            listed.len() == 3 && last.action_count > 0 && listed.iter().all(|r| r.complete == 1)
+        })
+    });
+    let written = || {
+        let file = fs::metadata(run.directory.join("schedule"));
+        file.and_then(|file| file.modified()).unwrap()
+    };
+    let before = written();
+    kill(run.pid_of(Role::Planner), libc::SIGKILL);
+    wait_until("word of the next planner", || written() != before);
+    assert_eq!(last_schedule(&run).unwrap().version, version);
+    assert_solved(&mut run);
 }
 
 #[test]

@@ -148,7 +148,8 @@ impl Planner {
 
     /// A planner in the place of one that is gone, as process `incarnation`, from 1. Nothing it
     /// makes has a version that one before it has used. `published` is the newest schedule of those
-    /// before, if it is at hand: it is published once more, for robots that are started now.
+    /// before, if it is at hand: it is published once more, for robots that are started now, and
+    /// robots are left to it if it is all of a plan for the version of the scene in force, `scene`.
     #[must_use]
     pub fn succeeding(
         scene: &Scene,
@@ -164,6 +165,7 @@ impl Planner {
         if let (Some(own), Some(published)) = (&mut planner.schedule, published) {
             own.copy_from(published);
             planner.schedule_version = published.version;
+            planner.scene_version = published.scene_version;
             planner.repeats = true;
             if let Some(anytime) = &mut planner.anytime {
                 anytime.inherit(published);
@@ -288,6 +290,7 @@ impl Planner {
         let last = in_force.max(self.schedule_version);
         schedule.version = last.max(self.versions_past) + 1;
         schedule.effect_tick = header.tick + 1;
+        schedule.scene_version = self.scene_version;
         self.schedule_version = schedule.version;
         schedule.hash_into(&mut self.journal);
         true

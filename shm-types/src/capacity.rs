@@ -28,6 +28,6 @@ pub const ROBOT_WORDS: usize = MAX_ROBOTS / 64;
 /// First word of every snapshot: "rearrang" in ASCII, little endian.
 pub const MAGIC: u64 = u64::from_le_bytes(*b"rearrang");
 /// Layout of the messages. Raised whenever one changes.
-pub const LAYOUT_VERSION: u32 = 4;
+pub const LAYOUT_VERSION: u32 = 5;
 
 const _: () = assert!(MAX_ROBOTS.is_multiple_of(64));

@@ -344,6 +344,7 @@ impl Validate for ConstraintTable {
 impl Validate for Schedule {
     fn validate(&self, counts: Counts) -> Result<(), Invalid> {
         version(self.version)?;
+        version(self.scene_version)?;
         // One that was made before a robot was added lists nothing for it.
         if self.robot_count > counts.robots {
             return Err(Invalid::Inconsistent {

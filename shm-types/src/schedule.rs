@@ -106,6 +106,10 @@ pub struct Schedule {
     /// for it waits for others until then, and for the planner after that. 0 where as much is
     /// listed as there is room for.
     pub listed_until_tick: u64,
+    /// Version of the scene that it was made for.
+    pub scene_version: u32,
+    /// Always 0.
+    pub reserved: u32,
     /// The first `robot_count` are live.
     pub robots: [RobotSchedule; MAX_ROBOTS],
     /// The first `action_count` are live.
@@ -160,6 +164,7 @@ impl Schedule {
         self.wait_count = other.wait_count;
         self.effect_tick = other.effect_tick;
         self.listed_until_tick = other.listed_until_tick;
+        self.scene_version = other.scene_version;
         self.robots[..robots].copy_from_slice(&other.robots[..robots]);
         self.actions[..actions].copy_from_slice(&other.actions[..actions]);
         self.waits[..waits].copy_from_slice(&other.waits[..waits]);
@@ -173,6 +178,7 @@ impl Schedule {
         hash.add(&[self.version, self.robot_count]);
         hash.add(&[self.action_count, self.wait_count]);
         hash.add(&[self.effect_tick, self.listed_until_tick]);
+        hash.add(&self.scene_version);
         hash.add(&self.robots[..self.robot_count as usize]);
         hash.add(&self.actions[..self.action_count as usize]);
         hash.add(&self.waits[..self.wait_count as usize]);

@@ -14,8 +14,8 @@ use std::path::Path;
 
 use planner::{Planner, PlannerInput};
 use shm_types::{
-    Checked, ConstraintTable, Counters, HardAnswer, HardRequest, PlannerReport, Schedule, Validate,
-    WorldSnapshot,
+    Checked, ConstraintTable, Counters, HardAnswer, HardRequest, PlannerReport, Schedule,
+    SnapshotHeader, Validate, WorldSnapshot,
 };
 
 use crate::calls::{OPEN_CALLS, Question, Server};
@@ -44,7 +44,7 @@ pub fn main(run_dir: &Path, incarnation: u32) -> Result<(), RoleError> {
             shell.send()?;
             continue;
         };
-        seat.follow(&snapshot.header)?;
+        shell.follow(&mut seat, &snapshot.header)?;
         let snapshot = Checked::new(&*snapshot, seat.counts()).map_err(refused("world"))?;
         shell.answer(&mut seat, snapshot)?;
     }
@@ -66,7 +66,8 @@ struct Held {
 
 /// The planner and its ports.
 struct Shell {
-    planner: Planner,
+    /// Once it has seen a snapshot: the scene may have changed since the run began.
+    planner: Option<Planner>,
     server: Server<HardRequest, HardAnswer>,
     /// Questions not answered yet, in the order in which they came.
     questions: Vec<Held>,
@@ -87,15 +88,9 @@ impl Shell {
         let (topics, node) = (&seat.topics, &seat.node);
         let schedules = topics.schedule_service(node, Access::Open)?;
         let most = seat.run.room().robots as usize * (OPEN_CALLS + 1);
-        let last = LastSchedule::new(seat.schedule_path());
         Ok(Self {
-            planner: Planner::succeeding(
-                &seat.scene,
-                seat.options().settings.clone(),
-                seat.incarnation,
-                last.read(seat.counts()).as_deref(),
-            ),
-            last,
+            planner: None,
+            last: LastSchedule::new(seat.schedule_path()),
             server: topics.hard.service(node, Access::Open)?.server()?,
             questions: Vec::with_capacity(most),
             requests: Vec::with_capacity(most),
@@ -111,7 +106,22 @@ impl Shell {
         })
     }
 
-    /// One tick: from a snapshot to a report.
+    /// Takes over the version of the scene that a snapshot names. With the first, the planner is
+    /// made.
+    fn follow(&mut self, seat: &mut Seat, header: &SnapshotHeader) -> Result<(), RoleError> {
+        seat.follow(header)?;
+        self.planner.get_or_insert_with(|| {
+            Planner::succeeding(
+                &seat.scene,
+                seat.options().settings.clone(),
+                seat.incarnation,
+                self.last.read(seat.counts()).as_deref(),
+            )
+        });
+        Ok(())
+    }
+
+    /// One tick: from a snapshot to a report. Nothing is answered before there is a planner.
     fn answer(
         &mut self,
         seat: &mut Seat,
@@ -119,13 +129,16 @@ impl Shell {
     ) -> Result<(), RoleError> {
         let header = &snapshot.header;
         self.receive(seat, header.tick)?;
+        let Some(planner) = &mut self.planner else {
+            return Ok(());
+        };
         let input = PlannerInput {
             snapshot,
             requests: &self.requests,
         };
         let units = seat.options().settings.units_per_tick(header.busy);
         let started_ns = clock::now_ns();
-        let output = self.planner.step(&seat.scene, input, units);
+        let output = planner.step(&seat.scene, input, units);
         seat.record_since(Timed::PlannerStep, started_ns);
         seat.answering();
         connect(&self.tables, self.schedules.as_ref())?;

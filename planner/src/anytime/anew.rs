@@ -39,6 +39,8 @@ impl Anytime {
             0 if self.script.is_none() && !is_on_its_way => Stage::New,
             _ => Stage::Stop,
         };
+        // No more of it is listed.
+        self.script = None;
     }
 
     /// Robots follow what an earlier process has published. If that is all of its plan they are left

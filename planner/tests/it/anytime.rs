@@ -242,3 +242,30 @@ fn assert_whole(run: &Run, before: u32) {
         assert!(left_m <= scene::CONTACT_M, "robot {robot} ends elsewhere");
     }
 }
+
+/// One robot of many carries so much that its actions do not all fit into its share of a schedule.
+fn long_plan() -> Scene {
+    let mut homes = vec![[0.5, 0.5]];
+    let idle = (0..63).map(|i| (f64::from(i % 8), f64::from(i / 8)));
+    homes.extend(idle.map(|(column, row)| [10.5 + 0.75 * column, 0.5 + 0.9 * row]));
+    let place = |i: u32| [1.0 + f64::from(i % 7), 2.0 + 3.0 * f64::from(i / 7)];
+    let trips: Vec<_> = (0..14)
+        .map(place)
+        .map(|[x, y]| ([x, y], Some([x, y + 0.8])))
+        .collect();
+    let wall = [9.2, 0.0, 9.5, 8.0];
+    scene_of(draft([0.0, 0.0, 17.0, 8.0], &[wall], &homes, &trips))
+}
+
+#[test]
+fn no_more_is_listed_of_a_plan_for_a_scene_that_is_past() {
+    let mut run = Run::of(long_plan());
+    run.settle();
+    let part = run.schedule.robots[0];
+    assert_eq!((run.schedule.scene_version, part.complete), (0, 0));
+    run.world.robots[0].actions = part.first + part.count;
+    run.world.header.scene_version = 1;
+    assert!(run.step(MUCH));
+    assert_eq!(run.schedule.scene_version, 1);
+    assert_eq!(run.schedule.action_count, 0);
+}

@@ -391,8 +391,17 @@ fn a_table_that_is_full_says_how_much_is_missing() {
 }
 
 /// Version and number of actions of what a planner publishes in its first step and in the next
-/// hundred, where this is in force.
+/// hundred, where this is in force, in the scene as it was first.
 fn published_after(last: Option<&Schedule>, in_force: u32) -> (Option<(u32, u32)>, usize) {
+    published_in(0, last, in_force)
+}
+
+/// The same in a version of the scene.
+fn published_in(
+    scene_version: u32,
+    last: Option<&Schedule>,
+    in_force: u32,
+) -> (Option<(u32, u32)>, usize) {
     let scene = shipped("paper-68a");
     let settings = Settings {
         method: Method::Anytime,
@@ -400,6 +409,7 @@ fn published_after(last: Option<&Schedule>, in_force: u32) -> (Option<(u32, u32)
     };
     let mut world = start(&scene);
     world.header.schedule_version = in_force;
+    world.header.scene_version = scene_version;
     for robot in &mut world.robots[..4] {
         robot.activity = Activity::Idle.code();
     }
@@ -451,6 +461,19 @@ fn the_next_planner_stops_robots_and_plans_anew_where_it_does_not_know_all_of_th
     let part = schedule_of_one_action(7, 0);
     for last in [Some(&*part), None] {
         let (first, more) = published_after(last, 7);
+        let (version, actions) = first.unwrap();
+        assert!(version > 7 && actions == 0, "{version}, {actions} actions");
+        assert!(more > 0, "and then plans");
+    }
+}
+
+#[test]
+fn the_next_planner_leaves_robots_to_a_whole_plan_for_the_scene_in_force_and_to_no_other() {
+    let mut last = schedule_of_one_action(7, 1);
+    last.scene_version = 2;
+    assert_eq!(published_in(2, Some(&last), 7), (Some((7, 1)), 0));
+    for in_force in [0, 1, 3] {
+        let (first, more) = published_in(in_force, Some(&last), 7);
         let (version, actions) = first.unwrap();
         assert!(version > 7 && actions == 0, "{version}, {actions} actions");
         assert!(more > 0, "and then plans");

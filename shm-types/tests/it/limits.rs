@@ -245,7 +245,7 @@ fn a_copy_is_the_same_to_every_reader() {
 
     let mut schedule: Box<Schedule> = zeroed();
     (schedule.version, schedule.effect_tick) = (7, 8);
-    schedule.listed_until_tick = 9;
+    (schedule.listed_until_tick, schedule.scene_version) = (9, 10);
     (
         schedule.robot_count,
         schedule.action_count,
