@@ -56,7 +56,7 @@ pub(crate) fn run(
         simulation.tick();
         let after = Instant::now();
         latency.record(Timed::Tick, (after - before).as_nanos() as u64);
-        files.add_tick(options, &simulation, after)?;
+        files.add_tick(options, &simulation)?;
         if after - shown >= PERIOD {
             shown = after;
             progress.show(checked(simulation.snapshot(), simulation.scene())?);
@@ -121,7 +121,6 @@ impl Files {
         &mut self,
         options: &RunOptions,
         simulation: &Simulation<'_>,
-        now: Instant,
     ) -> Result<(), Failure> {
         let scene = simulation.scene();
         let version = simulation.snapshot().header.scene_version;
@@ -131,7 +130,7 @@ impl Files {
             self.recording.change(&record).map_err(Failure::system)?;
         }
         self.recording
-            .motion(simulation.motion(), now)
+            .motion(simulation.motion())
             .map_err(Failure::system)?;
         self.add_state(scene, simulation.snapshot())?;
         if let Some(file) = &mut self.hashes {

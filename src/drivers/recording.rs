@@ -1,20 +1,17 @@
 //! The trace of a run in this process, and its check.
 //!
 //! Responsible for: the file: the one asked for, or one without a name that is gone when the
-//! program is; ending a chunk every second of wall time.
+//! program is.
 //! Not responsible for: what is in a trace, or what makes it a legal one (crate `trace`).
 
 use std::fs::{self, File};
 use std::io::{self, BufReader, BufWriter, Seek};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use shm_types::{Checked, MotionBatch, WorldSnapshot};
 use trace::{CheckReport, Ending, SceneRecord, WriteError, Writer};
-
-/// Wall time after which a chunk ends, so that a file cut short has all but the last of it.
-const FLUSH_EVERY: Duration = Duration::from_secs(1);
 
 /// Why there is no trace, or no check of it.
 #[derive(Debug, thiserror::Error)]
@@ -43,7 +40,6 @@ pub(crate) struct Recording {
     /// Whether it was asked for.
     kept: bool,
     writer: Writer<BufWriter<File>>,
-    flushed: Instant,
 }
 
 impl Recording {
@@ -63,7 +59,6 @@ impl Recording {
         Ok(Self {
             kept: path.is_some(),
             writer: Writer::new(BufWriter::new(file), scene, state_every_ns)?,
-            flushed: Instant::now(),
         })
     }
 
@@ -79,17 +74,8 @@ impl Recording {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub(crate) fn motion(
-        &mut self,
-        motion: &MotionBatch,
-        now: Instant,
-    ) -> Result<(), RecordingError> {
-        self.writer.batch(motion)?;
-        if now.duration_since(self.flushed) >= FLUSH_EVERY {
-            self.flushed = now;
-            self.writer.flush()?;
-        }
-        Ok(())
+    pub(crate) fn motion(&mut self, motion: &MotionBatch) -> Result<(), RecordingError> {
+        Ok(self.writer.batch(motion)?)
     }
 
     /// Offers a state: those that are due are kept.

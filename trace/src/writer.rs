@@ -1,12 +1,13 @@
 //! Writing a trace while the run goes on.
 //!
-//! Responsible for: what is written when, joining pieces of motion, ending chunks so that a file
-//! cut short still reads, noticing lost batches.
-//! Not responsible for: clocks (the caller says when a second has passed, by [`Writer::flush`])
-//! or the words themselves (`record`).
+//! Responsible for: what is written when, joining pieces of motion, marks, so that a file cut short
+//! still reads, noticing lost batches.
+//! Not responsible for: the words themselves (`record`).
 //!
-//! A chunk is built in memory and written whole. Each ends with a mark, before which every piece
-//! of motion so far has been written: up to the last whole chunk nothing is missing.
+//! A chunk is built in memory and written whole. A mark says that every piece of motion so far has
+//! been written: up to the last one in a whole chunk nothing is missing. It cuts the pieces that are
+//! under way, so where marks are follows from the run alone, and not from how long it takes: equal
+//! runs have equal pieces.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
@@ -21,8 +22,13 @@ use crate::merge::Pending;
 use crate::record::{BodyKind, End, Gap, Mark, Motion, Outcome, SceneRecord};
 use crate::wire;
 
-/// A chunk is ended once it holds this many bytes, whether or not the caller flushes.
+/// A chunk is ended once it holds this many bytes.
 const CHUNK_BYTES: usize = 1 << 20;
+/// A mark is set, and the chunk with it ended, with each of these of virtual time, ns.
+const MARK_EVERY_NS: u64 = 1_000_000_000;
+/// Batches, and bytes of them, after which it is, too: until then the world keeps them.
+const MARK_EVERY_BATCHES: u64 = 1_024;
+const MARK_EVERY_BYTES: usize = 1 << 20;
 
 /// Why a trace could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -114,8 +120,7 @@ fn read_back(old: impl Read, run_id: &str) -> Option<ReadBack> {
 /// Writes one trace.
 ///
 /// Give it every batch in order, and snapshots as often as they come: it keeps those that are
-/// due. Call [`Writer::flush`] at least once a second of wall time, and [`Writer::finish`] at the
-/// end.
+/// due. Call [`Writer::finish`] at the end.
 pub struct Writer<W: Write> {
     file: mcap::Writer<NoSeek<W>>,
     counts: Counts,
@@ -124,9 +129,13 @@ pub struct Writer<W: Write> {
     /// A gap was found; the next snapshot from this tick on is written, due or not.
     resync_from: Option<u64>,
     next_sequence: u64,
+    /// The same when the file was whole last.
+    safe_sequence: u64,
     missing: u64,
     last: Mark,
     marked: Option<Mark>,
+    /// Bytes of batches since the last mark.
+    unmarked_bytes: usize,
     robots: Vec<Option<Pending>>,
     objects: Vec<Option<Pending>>,
     channels: BTreeMap<&'static str, (u16, u32)>,
@@ -155,12 +164,14 @@ impl<W: Write> Writer<W> {
             state_due_ns: 0,
             resync_from: None,
             next_sequence: 0,
+            safe_sequence: 0,
             missing: 0,
             last: Mark {
                 tick: 0,
                 time_ns: 0,
             },
             marked: None,
+            unmarked_bytes: 0,
             robots: scene.homes.iter().map(|_| None).collect(),
             objects: scene.objects.iter().map(|_| None).collect(),
             channels: BTreeMap::new(),
@@ -182,7 +193,7 @@ impl<W: Write> Writer<W> {
     pub fn change(&mut self, scene: &SceneRecord) -> Result<(), WriteError> {
         // The record comes first behind a mark, whatever has been written since the last one.
         self.marked = None;
-        self.mark()?;
+        self.flush()?;
         self.counts = counts(scene);
         self.robots.resize_with(scene.homes.len(), || None);
         self.objects.resize_with(scene.objects.len(), || None);
@@ -303,10 +314,19 @@ impl<W: Write> Writer<W> {
             self.write(Channel::Event, event.time_ns, &event)?;
         }
         self.next_sequence = batch.sequence + 1;
+        self.unmarked_bytes += size_of_val(batch.motions()) + size_of_val(batch.events());
+        let before_ns = self.last.time_ns;
         self.last = Mark {
             tick: batch.tick,
             time_ns: batch.time_ns,
         };
+        let marked = self.marked.map_or(0, |mark| mark.tick);
+        if batch.time_ns / MARK_EVERY_NS != before_ns / MARK_EVERY_NS
+            || batch.tick >= marked.saturating_add(MARK_EVERY_BATCHES)
+            || self.unmarked_bytes >= MARK_EVERY_BYTES
+        {
+            return self.flush();
+        }
         self.end_full_chunk()
     }
 
@@ -375,15 +395,21 @@ impl<W: Write> Writer<W> {
     /// The file cannot be written.
     pub fn flush(&mut self) -> Result<(), WriteError> {
         self.mark()?;
-        self.chunk_bytes = 0;
-        Ok(self.file.flush()?)
+        self.end_chunk()?;
+        self.safe_sequence = self.next_sequence;
+        Ok(())
     }
 
     fn end_full_chunk(&mut self) -> Result<(), WriteError> {
         if self.chunk_bytes >= CHUNK_BYTES {
-            self.flush()?;
+            self.end_chunk()?;
         }
         Ok(())
+    }
+
+    fn end_chunk(&mut self) -> Result<(), WriteError> {
+        self.chunk_bytes = 0;
+        Ok(self.file.flush()?)
     }
 
     /// Writes all pending motion, and a mark if anything is new since the last.
@@ -403,7 +429,14 @@ impl<W: Write> Writer<W> {
             let mark = self.last;
             self.write(Channel::Mark, mark.time_ns, &mark)?;
         }
+        self.unmarked_bytes = 0;
         Ok(())
+    }
+
+    /// All batches before this one are in a file that is cut short now.
+    #[must_use]
+    pub const fn safe_sequence(&self) -> u64 {
+        self.safe_sequence
     }
 
     /// How many batches were lost so far: with any, the trace is incomplete.

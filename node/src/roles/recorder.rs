@@ -1,7 +1,7 @@
 //! The loop around the trace's writer.
 //!
-//! Responsible for: giving the writer every batch in order and the snapshots as they come, ending
-//! a chunk every second of wall time, telling the world how far it has come.
+//! Responsible for: giving the writer every batch in order and the snapshots as they come, telling
+//! the world how far it has come.
 //! Not responsible for: what is in a trace (crate `trace`).
 //!
 //! The recorder sleeps between two looks whatever the others do, so that it takes many batches at
@@ -18,7 +18,6 @@ use shm_types::{
 };
 use trace::{Ending, Resumed, SceneRecord, WriteError, Writer};
 
-use crate::clock;
 use crate::options::Role;
 use crate::ports::{Access, Publisher, Subscriber};
 use crate::report::RecorderSummary;
@@ -30,11 +29,6 @@ use crate::wakes::Waker;
 const PERIOD: Duration = Duration::from_micros(500);
 /// Batches at once that say it is falling behind.
 const BEHIND: u64 = MOTION_WINDOW / 2;
-/// Wall time after which a chunk ends, so that a file cut short has all but the last of it, ns.
-const FLUSH_EVERY_NS: u64 = 1_000_000_000;
-/// Batches, and bytes of them, after which it ends too: until then the world keeps them.
-const FLUSH_EVERY_BATCHES: u64 = 1_024;
-const FLUSH_EVERY_BYTES: usize = 1 << 20;
 
 /// Takes part in the run in `run_dir`, as process `incarnation` of the recorder, until it ends.
 ///
@@ -63,15 +57,12 @@ pub fn main(run_dir: &Path, incarnation: u32) -> Result<(), RoleError> {
 struct Shell {
     path: PathBuf,
     writer: Writer<BufWriter<File>>,
-    flushed_ns: u64,
     motion: Subscriber<MotionBatch>,
     snapshots: Subscriber<WorldSnapshot>,
     outlet: Publisher<RecorderReport>,
     waker: Option<Waker>,
     report: RecorderReport,
     batches: u64,
-    /// Bytes of the batches since the last chunk ended.
-    unflushed_bytes: usize,
     /// How the run ended, and when, ns of virtual time.
     ended: Option<(Outcome, u64)>,
     /// Whether the snapshot after that has come, so that everybody can know of the end.
@@ -105,7 +96,6 @@ impl Shell {
         let (topics, node) = (&seat.topics, &seat.node);
         Ok(Self {
             path,
-            flushed_ns: clock::now_ns(),
             motion: topics.motion.service(node, Access::Open)?.subscriber()?,
             snapshots: topics.world.service(node, Access::Open)?.subscriber()?,
             outlet: topics.recorder.service(node, Access::Open)?.publisher()?,
@@ -119,7 +109,6 @@ impl Shell {
             },
             writer,
             batches: next_sequence,
-            unflushed_bytes: 0,
             ended: None,
             end_is_out: false,
         })
@@ -158,14 +147,6 @@ impl Shell {
             self.writer
                 .snapshot(snapshot)
                 .map_err(|error| unwritten(&self.path, &error))?;
-        }
-        let open = self.report.next_sequence - self.report.durable_sequence;
-        if clock::now_ns() >= self.flushed_ns + FLUSH_EVERY_NS
-            || open >= FLUSH_EVERY_BATCHES
-            || self.unflushed_bytes >= FLUSH_EVERY_BYTES
-        {
-            self.flush()?;
-            self.tell()?;
         }
         let taken = self.batches - before;
         if taken > 0 {
@@ -217,8 +198,8 @@ impl Shell {
             .batch(batch)
             .map_err(|error| unwritten(&self.path, &error))?;
         self.batches += 1;
-        self.unflushed_bytes += size_of_val(batch.motions()) + size_of_val(batch.events());
         self.report.next_sequence = batch.sequence + 1;
+        self.report.durable_sequence = self.writer.safe_sequence();
         self.report.lost = self.writer.missing_batches();
         let ended = EventKind::Ended.code();
         if let Some(end) = batch.events().iter().find(|event| event.kind == ended) {
@@ -226,16 +207,6 @@ impl Shell {
             let outcome = outcome.and_then(|code| Outcome::decode(code).ok());
             self.ended = Some((outcome.unwrap_or(Outcome::Failed), batch.time_ns));
         }
-        Ok(())
-    }
-
-    fn flush(&mut self) -> Result<(), RoleError> {
-        self.flushed_ns = clock::now_ns();
-        self.writer
-            .flush()
-            .map_err(|error| unwritten(&self.path, &error))?;
-        self.unflushed_bytes = 0;
-        self.report.durable_sequence = self.report.next_sequence;
         Ok(())
     }
 
@@ -258,7 +229,9 @@ impl Shell {
             complete: lost == 0 && self.ended.is_some(),
         };
         let Some((outcome, makespan_ns)) = self.ended else {
-            self.flush()?;
+            self.writer
+                .flush()
+                .map_err(|error| unwritten(&self.path, &error))?;
             return Ok(summary);
         };
         let ending = Ending {
