@@ -92,11 +92,12 @@ mod tests {
 
     #[test]
     fn what_is_kept_is_all_that_is_listed_waits_for_nothing_else_and_ends_with_free_hands() {
-        let mut waited = 0;
+        let (mut waited, mut moved_again) = (0, 0);
         for seed in 0..6 {
             let options = scene::GenerateOptions {
                 seed,
                 crowding: 0.8,
+                extra_moves: 2,
                 ..scene::GenerateOptions::default()
             };
             let (scene, mut solver, makespan) = planned(&options);
@@ -114,6 +115,9 @@ mod tests {
                     assert_eq!(grips.count() % 2, 0, "{seed}: {robot} holds something");
                     let is_all = kept[robot] == track.deeds.len();
                     assert!(is_all || script.listable(robot) as usize <= actions(robot));
+                    for deed in &track.deeds[..kept[robot]] {
+                        moved_again += assert_put_down(tracks, &kept, *deed);
+                    }
                     for action in 0..actions(robot) {
                         for wait in script.waits(robot, action) {
                             waited += 1;
@@ -129,6 +133,24 @@ mod tests {
                 }
             }
         }
-        assert!(waited > 0);
+        assert!(waited > 0 && moved_again > 0);
+    }
+
+    /// An object that is grasped again has been put down by what is kept; whether it is one.
+    fn assert_put_down(tracks: &[Track], kept: &[usize], deed: Deed) -> usize {
+        let Deed::Grasped(object, turn, ..) = deed else {
+            return 0;
+        };
+        let Some((robot, deeds)) = put_down(tracks, object, turn) else {
+            assert_eq!(turn, 0);
+            return 0;
+        };
+        let before = &tracks[robot].deeds[..deeds];
+        let grasped = |deed: &&Deed| matches!(**deed, Deed::Grasped(of, ..) if of == object);
+        let last = before.iter().rev().find(grasped);
+        assert!(matches!(last, Some(Deed::Grasped(_, past, ..)) if past + 1 == turn));
+        assert!(matches!(before.last(), Some(Deed::Released(of, _)) if *of == object));
+        assert!(kept[robot] >= deeds);
+        1
     }
 }

@@ -426,6 +426,21 @@ mod tests {
         assert_eq!(routes.shared_s(0, both), 2.0);
     }
 
+    /// A robot that has one object cannot grasp another before it has put that down.
+    #[test]
+    fn on_one_robot_what_comes_before_a_finish_comes_before_the_whole_task() {
+        use Event::{Finish, Grasp};
+        for before in [Grasp(1), Finish(1)] {
+            let model = Model::new(&line(), (0.0, 0.0), [order(before, Finish(0))]).unwrap();
+            let routes = Routes::new(&model);
+            // Robot 0: to 2 and 3, back to 0, to 1 and home.
+            assert_eq!(routes.whole_s(0, 0b11), 8.0, "{before:?}");
+            // Nothing comes after task 0, and task 1 not.
+            assert_eq!(routes.rest_s(0, 0, 0b10), 5.0);
+            assert_eq!(routes.rest_s(0, 1, 0b01), 5.0);
+        }
+    }
+
     #[test]
     fn a_small_room_is_searched_as_a_large_one_is() {
         let at = |x: f64| Vec2::new(x / 64.0, 0.0);

@@ -1,12 +1,14 @@
 //! Shortest plans of rooms small enough to count in.
 
-use scene::Settings;
+use scene::{Budget, Settings};
+use shm_types::{Checked, Counters, RobotState, Schedule, SnapshotHeader, WorldSnapshot, zeroed};
 
 use super::*;
 use crate::anytime::plan::Plan;
 use crate::anytime::situation::Situation;
-use crate::anytime::solver::testing::cells;
+use crate::anytime::solver::testing::{cells, solver_of};
 use crate::anytime::track::grips_in_turn;
+use crate::anytime::{Anytime, Standing};
 
 /// A shortest plan with fewer than `most` steps, laid out, and how many it has; none if there is
 /// none.
@@ -86,4 +88,49 @@ fn as_many_steps_are_taken_as_have_to_be() {
         assert_eq!(least(rows, steps + 1), Some(steps as usize), "{rows:?}");
         assert_eq!(least(rows, steps), None, "{rows:?}");
     }
+}
+
+/// The world at the start of a run.
+fn start(scene: &Scene) -> Box<WorldSnapshot> {
+    let mut world = zeroed::<WorldSnapshot>();
+    let counts = scene.counts();
+    world.header = SnapshotHeader {
+        robot_count: counts.robots,
+        object_count: counts.objects,
+        ..SnapshotHeader::default()
+    };
+    for (state, home) in world.robots.iter_mut().zip(&scene.homes) {
+        *state = RobotState {
+            position: scene::point(*home),
+            live: 1,
+            ..RobotState::default()
+        };
+    }
+    for (state, spec) in world.objects.iter_mut().zip(&scene.objects) {
+        state.position = scene::point(spec.start);
+        state.rest = state.position;
+        state.goal = spec.goal.map(scene::point).unwrap_or_default();
+        state.has_goal = 1;
+        (state.holder, state.claimed_by) = (shm_types::NONE, shm_types::NONE);
+    }
+    world
+}
+
+/// Two that have to get past each other: the first plan found is not a shortest one.
+#[test]
+fn where_a_shortest_plan_can_be_found_robots_set_off_with_one() {
+    let rows = ["aA2.", "bB1."];
+    let scene = cells(&rows);
+    let first = solver_of(&scene).first(&scene, 0).unwrap();
+    let steps = least(&rows, first / duration(0)).unwrap();
+    let world = start(&scene);
+    let snapshot = Checked::new(&*world, scene.counts()).unwrap();
+    let mut anytime = Anytime::new(&Settings::default());
+    let mut out = zeroed::<Schedule>();
+    let mut counters = Counters::default();
+    let mut budget = Budget::new(u64::MAX);
+    let standing = anytime.advance(&scene, snapshot, &mut budget, &mut counters, &mut out);
+    assert_eq!(standing, Standing::Written);
+    let solver = anytime.solver.as_ref().unwrap();
+    assert_eq!(solver.plan.makespan() / duration(0), steps as u32);
 }

@@ -530,3 +530,29 @@ fn improving_begins_with_the_first_order_by_the_quickest_ways() {
     }
     assert!(is_better, "haste never made anything longer");
 }
+
+/// Nobody gets past anybody in a corridor. Whichever goals are given first, one way round is left.
+#[test]
+fn where_interchangeable_objects_cannot_get_to_the_goals_given_first_they_get_others() {
+    let mut draft = cells(&["Aab..12"]).draft().clone();
+    for object in &mut draft.objects {
+        object.kind = Some("crate".to_owned());
+    }
+    let scene = Scene::new(draft).unwrap();
+    let mut in_turn = 0;
+    for swapped in [false, true] {
+        let mut solver = solver_of(&scene);
+        if swapped {
+            solver.goals.swap(0, 1);
+        }
+        let attempt = (0..8).find(|attempt| solver.first(&scene, *attempt).is_some());
+        in_turn += u32::from(attempt.unwrap() == 0);
+        let ends = grips_in_turn(solver.plan.tracks()).into_iter();
+        let ends: BTreeSet<_> = ends
+            .filter(|grip| grip.is_release)
+            .map(|grip| (grip.place.at.x * 2.0) as u32)
+            .collect();
+        assert!(ends.is_superset(&BTreeSet::from([11, 13])), "{ends:?}");
+    }
+    assert_eq!(in_turn, 1);
+}
