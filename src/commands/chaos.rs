@@ -2,11 +2,12 @@
 //! nothing had been.
 //!
 //! Responsible for: as many runs as the kills need, and the verdict on them.
-//! Not responsible for: what is struck when (`plan`), striking (`victim`), what is counted
-//! (`report`), recovering (crate `node`).
+//! Not responsible for: what is struck when (`plan`), striking (`victim`), how long set-ups
+//! last (`set_ups`), what is counted (`report`), recovering (crate `node`).
 
 mod plan;
 mod report;
+mod set_ups;
 mod victim;
 
 use std::time::Duration;
@@ -16,7 +17,8 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::{output, scenario};
 use plan::Plan;
 use report::Report;
-use victim::{SetUps, Victim};
+use set_ups::SetUps;
+use victim::Victim;
 
 /// A run without any sign of life for so long is wedged.
 const WEDGED: Duration = Duration::from_secs(30);
@@ -29,15 +31,14 @@ pub(crate) fn main(args: &ChaosArgs) -> Outcome {
     let scene = scenario::load(&args.scenario, args.robots)?.scene;
     let mut plan = Plan::new(args);
     let mut report = Report::new(args, scene.homes.len());
-    let mut set_ups = SetUps::new();
+    let mut set_ups = SetUps::default();
     while plan.is_open() && report.failures.len() < MOST_FAILED {
         let number = report.runs;
         report.runs += 1;
-        let victim = Victim::start(args, number, set_ups);
+        let victim = Victim::start(args, number, &mut set_ups);
         let mut victim = victim
             .map_err(|error| Failure::system(format!("a run could not be started: {error}")))?;
         let ended = victim.torment(&mut plan, WEDGED);
-        set_ups = victim.set_ups();
         report.take(victim, ended, &mut plan);
         if output::is_watched() {
             output::complain(&report.progress(&plan));

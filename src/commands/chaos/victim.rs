@@ -7,6 +7,9 @@
 //! Terms: a process is *in set-up* from its start to its first answer; a supervisor until all of its
 //! processes are ready. A run is *steady* while all are.
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{self, Read};
@@ -22,6 +25,7 @@ use serde_json::Value;
 
 use crate::cli::{ChaosArgs, ChaosClock, Phase, Target};
 use crate::commands::chaos::plan::{Blow, How, Plan};
+use crate::commands::chaos::set_ups::SetUps;
 
 /// Sleep between two looks.
 const PERIOD: Duration = Duration::from_micros(500);
@@ -33,13 +37,8 @@ const STALL_MS: f64 = 120.0;
 const PER_SET_UP: usize = 24;
 /// Blows after which a run is left in peace until its end.
 const PER_RUN: usize = 100;
-/// What a set-up is taken to last before one was seen, ns.
-const FIRST_GUESS_NS: u64 = 40_000_000;
 /// A blow this close to the end of the last task may have come after it, ns.
 const MARGIN_NS: u64 = 5_000_000;
-
-/// How long the set-up of each role usually lasts, ns.
-pub(crate) type SetUps = BTreeMap<Target, u64>;
 
 /// A blow that was dealt.
 #[derive(Clone, Copy, Debug)]
@@ -85,7 +84,7 @@ pub(crate) enum Ended {
 }
 
 /// The run.
-pub(crate) struct Victim {
+pub(crate) struct Victim<'a> {
     name: String,
     pub(crate) number: usize,
     program: PathBuf,
@@ -101,7 +100,7 @@ pub(crate) struct Victim {
     armed: Vec<Armed>,
     stalled: Vec<(u32, u64)>,
     set_up_blows: usize,
-    set_ups: SetUps,
+    set_ups: &'a mut SetUps,
     /// Since when no task is open, as far as is known.
     done_ns: Option<u64>,
     pub(crate) dealt: Vec<Dealt>,
@@ -112,13 +111,13 @@ pub(crate) struct Victim {
     scenario: Vec<String>,
 }
 
-impl Victim {
-    /// Starts run `number`, knowing how long set-ups have lasted in those before it.
-    pub(crate) fn start(args: &ChaosArgs, number: usize, set_ups: SetUps) -> io::Result<Self> {
-        let program = std::env::current_exe()?;
-        let own = std::process::id();
-        let name = format!("chaos-{own}-{number}");
-        let at = |end: &str| std::env::temp_dir().join(format!("rearrange-{name}.{end}"));
+impl<'a> Victim<'a> {
+    /// Starts run `number`. How long set-ups last it knows from those before it, and tells the next.
+    pub(crate) fn start(
+        args: &ChaosArgs,
+        number: usize,
+        set_ups: &'a mut SetUps,
+    ) -> io::Result<Self> {
         let mut scenario = vec![args.scenario.clone()];
         if let Some(robots) = args.robots {
             scenario.extend(["--robots".to_owned(), robots.to_string()]);
@@ -133,6 +132,18 @@ impl Victim {
                 scenario.extend(["--clock", "real", "--speed", "10"].map(str::to_owned));
             }
         }
+        Self::of(std::env::current_exe()?, scenario, number, set_ups)
+    }
+
+    fn of(
+        program: PathBuf,
+        scenario: Vec<String>,
+        number: usize,
+        set_ups: &'a mut SetUps,
+    ) -> io::Result<Self> {
+        let own = std::process::id();
+        let name = format!("chaos-{own}-{number}");
+        let at = |end: &str| std::env::temp_dir().join(format!("rearrange-{name}.{end}"));
         let (out, errors) = (at("json"), at("err"));
         File::create(&errors)?;
         let mut victim = Self {
@@ -182,12 +193,6 @@ impl Victim {
             self.strike(plan);
             std::thread::sleep(PERIOD);
         }
-    }
-
-    /// How long set-ups last, as this run and those before it have shown. A blow that came too late,
-    /// since that was guessed too long, comes in time in one of the next runs.
-    pub(crate) fn set_ups(&self) -> SetUps {
-        self.set_ups.clone()
     }
 
     /// What it printed.
@@ -297,7 +302,7 @@ impl Victim {
         };
         process.ready = true;
         let lasted_ns = at_ns - process.started_ns;
-        self.learn(target_of(role), lasted_ns);
+        self.set_ups.learn(target_of(role), lasted_ns);
         let last = self
             .dealt
             .iter_mut()
@@ -305,7 +310,8 @@ impl Victim {
             .find(|dealt| dealt.role == Some(role));
         recovered(last, at_ns);
         if self.is_steady() {
-            self.learn(Target::Supervisor, at_ns.saturating_sub(self.supervised_ns));
+            let lasted_ns = at_ns.saturating_sub(self.supervised_ns);
+            self.set_ups.learn(Target::Supervisor, lasted_ns);
             let last = self
                 .dealt
                 .iter_mut()
@@ -313,20 +319,6 @@ impl Victim {
                 .find(|dealt| dealt.role.is_none());
             recovered(last, at_ns);
         }
-    }
-
-    /// How long set-ups of a role last: what the newest did weighs an eighth.
-    fn learn(&mut self, target: Target, lasted_ns: u64) {
-        let usual = self.set_ups.entry(target).or_insert(lasted_ns);
-        *usual = *usual - *usual / 8 + lasted_ns / 8;
-    }
-
-    fn usual_ns(&self, target: Target) -> u64 {
-        let guess = match target {
-            Target::Supervisor => 4 * FIRST_GUESS_NS,
-            _ => FIRST_GUESS_NS,
-        };
-        self.set_ups.get(&target).copied().unwrap_or(guess)
     }
 
     fn is_steady(&self) -> bool {
@@ -364,7 +356,7 @@ impl Victim {
             }
             let target = role.map_or(Target::Supervisor, target_of);
             if let Some(blow) = plan.next(Phase::Setup, target) {
-                let after_ns = (blow.at * self.usual_ns(target) as f64) as u64;
+                let after_ns = (blow.at * self.set_ups.usual_ns(target) as f64) as u64;
                 self.set_up_blows += 1;
                 self.armed.push(Armed {
                     phase: Phase::Setup,
@@ -456,7 +448,7 @@ impl Victim {
 
     fn deal(&mut self, armed: &Armed, plan: &mut Plan) {
         let at_ns = node::monotonic_ns();
-        let usual_ns = self.usual_ns(armed.target).max(1);
+        let usual_ns = self.set_ups.usual_ns(armed.target).max(1);
         self.dealt.push(Dealt {
             phase: armed.phase,
             target: armed.target,
@@ -537,7 +529,7 @@ impl Victim {
     }
 }
 
-impl Drop for Victim {
+impl Drop for Victim<'_> {
     fn drop(&mut self) {
         self.put_down();
     }
