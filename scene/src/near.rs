@@ -32,6 +32,7 @@ impl Aabb {
     }
 
     /// The box of two points.
+    #[inline]
     #[must_use]
     pub fn around(a: Vec2, b: Vec2) -> Self {
         Self {
@@ -41,6 +42,7 @@ impl Aabb {
     }
 
     /// The box of both.
+    #[inline]
     #[must_use]
     pub fn joined(self, other: Self) -> Self {
         Self {
@@ -50,6 +52,7 @@ impl Aabb {
     }
 
     /// This box, centred at `at`.
+    #[inline]
     #[must_use]
     pub fn at(self, at: Vec2) -> Self {
         Self {
@@ -59,6 +62,7 @@ impl Aabb {
     }
 
     /// What a body of box `body` covers while its centre is anywhere in this box.
+    #[inline]
     #[must_use]
     pub fn swept_by(self, body: Self) -> Self {
         Self {
@@ -69,6 +73,7 @@ impl Aabb {
 
     /// Whether the two have a point in common. All four are compared at once: which of them
     /// holds nobody can foresee, whether all do mostly.
+    #[inline]
     #[must_use]
     pub fn meets(&self, other: &Self) -> bool {
         (self.min.x <= other.max.x)
@@ -197,6 +202,7 @@ impl Near {
     }
 
     /// Where `thing` lies.
+    #[inline]
     #[must_use]
     pub fn place(&self, thing: usize) -> Option<Vec2> {
         self.places[thing]

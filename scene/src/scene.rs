@@ -162,6 +162,7 @@ impl Scene {
     /// # Panics
     /// When there is no such class: classes come from this scene's objects or are
     /// [`ROBOT_ALONE`].
+    #[inline]
     #[must_use]
     pub fn body(&self, class: ClassId) -> &Body {
         &self.classes[class.0]
