@@ -36,6 +36,8 @@ pub(crate) struct Participant {
 pub(crate) struct Life {
     /// Processor time of its main thread, ns.
     pub(crate) used_ns: u64,
+    /// Whether that waits for a core or a disk, which is none of its own doing.
+    pub(crate) is_held_up: bool,
 }
 
 impl Life {
@@ -44,8 +46,19 @@ impl Life {
         // To the nanosecond: one that only looks now and then uses little.
         let text = std::fs::read_to_string(format!("/proc/{pid}/schedstat")).ok()?;
         let used_ns = text.split_whitespace().next()?.parse().ok()?;
-        Some(Self { used_ns })
+        let text = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+        Some(Self {
+            used_ns,
+            is_held_up: is_held_up(&text)?,
+        })
     }
+}
+
+/// Whether a process is ready to run or in uninterruptible sleep, by its `/proc/PID/stat`.
+fn is_held_up(stat: &str) -> Option<bool> {
+    // The name before it is in brackets, and may hold any of them itself.
+    let (_, after_name) = stat.rsplit_once(')')?;
+    Some(matches!(after_name.trim_start().chars().next()?, 'R' | 'D'))
 }
 
 /// The arguments of a role after the launcher's own: `ROLE --run DIR [--index N] [--incarnation K]`.
@@ -216,5 +229,14 @@ mod tests {
             std::hint::black_box((0..10_000).sum::<u64>());
         }
         assert_eq!(Life::of(u32::MAX), None);
+    }
+
+    #[test]
+    fn who_waits_for_a_core_or_a_disk_is_held_up_and_who_sleeps_or_is_stopped_is_not() {
+        for (state, expected) in [('R', true), ('D', true), ('S', false), ('T', false)] {
+            let stat = format!("7 (a) D (b)) {state} 1 7 7 0 -1");
+            assert_eq!(is_held_up(&stat), Some(expected), "{stat}");
+        }
+        assert_eq!(is_held_up("7 (a"), None);
     }
 }

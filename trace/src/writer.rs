@@ -236,6 +236,9 @@ impl<W: Write> Writer<W> {
                 writer.missing = writer.missing.saturating_add(gap.batches);
             }
             writer.write_json(*channel, *time_ns, json)?;
+            if *channel == Channel::Mark {
+                writer.end_chunk()?;
+            }
         }
         writer.next_sequence = found.last.tick;
         writer.last = found.last;

@@ -479,6 +479,50 @@ fn a_trace_that_broke_off_is_gone_on_with_as_if_it_had_not() {
     assert!(made.is_none(), "a file of another run");
 }
 
+/// Lengths of the chunks of a file, in bytes.
+fn chunks(file: &[u8]) -> Vec<u64> {
+    let mut rest = &file[mcap::MAGIC.len()..];
+    let mut found = Vec::new();
+    while let [opcode, body @ ..] = rest
+        && let Some((length, body)) = body.split_first_chunk()
+        && let length = u64::from_le_bytes(*length)
+        && let Some(next) = body.get(usize::try_from(length).unwrap()..)
+    {
+        if *opcode == mcap::records::op::CHUNK {
+            found.push(length);
+        }
+        rest = next;
+    }
+    found
+}
+
+/// A chunk is read as a whole, and refused if it is too large for that.
+#[test]
+fn what_is_copied_has_chunks_no_larger_than_before() {
+    let mut out = Cursor::new(Vec::new());
+    {
+        let mut writer = Writer::new(&mut out, &scene(), 0).unwrap();
+        let mut world = World::new();
+        for tick in 0..10_000 {
+            let aside = if tick % 2 == 0 { 1.0 } else { -1.0 };
+            world.tick(aside, 0.0, &[]);
+            writer.batch(&world.batch).unwrap();
+            let snapshot = Checked::new(&*world.snapshot, COUNTS).unwrap();
+            writer.snapshot(snapshot).unwrap();
+        }
+        writer.flush().unwrap();
+    }
+    let before = chunks(out.get_ref());
+    assert!(before.len() > 3, "{before:?}");
+    let mut copy = Cursor::new(Vec::new());
+    let made = Writer::go_on(out.get_ref().as_slice(), &mut copy, &scene(), 0).unwrap();
+    let (writer, resumed) = made.unwrap();
+    assert_eq!(resumed.next_sequence, 10_000);
+    drop(writer);
+    let after = chunks(copy.get_ref());
+    assert!(after.iter().max() <= before.iter().max(), "{after:?}");
+}
+
 #[test]
 fn what_is_no_trace_is_refused_with_the_way_out() {
     let said = |bytes: &[u8]| check(bytes).unwrap_err().to_string();

@@ -183,8 +183,9 @@ impl Context<'_> {
             });
         }
         let began_ns = match self.rules.hands[robot].grip {
-            Grip::Closing(began_ns) => Some(began_ns),
-            Grip::Still | Grip::Opening(_) => None,
+            Grip::Closing(began_ns) => began_ns,
+            Grip::Still | Grip::Opening(_) => self.time_ns,
+            Grip::Unknown => return,
         };
         self.grip(robot, task, began_ns, self.scene.robot.grasp_ns, "closes");
     }
@@ -205,8 +206,9 @@ impl Context<'_> {
             });
         }
         let began_ns = match self.rules.hands[robot].grip {
-            Grip::Opening(began_ns) => Some(began_ns),
-            Grip::Still | Grip::Closing(_) => None,
+            Grip::Opening(began_ns) => began_ns,
+            Grip::Still | Grip::Closing(_) => self.time_ns,
+            Grip::Unknown => return,
         };
         self.grip(robot, task, began_ns, self.scene.robot.release_ns, "opens");
     }
@@ -216,11 +218,10 @@ impl Context<'_> {
         &mut self,
         robot: usize,
         task: usize,
-        began_ns: Option<u64>,
+        began_ns: u64,
         duration_ns: u64,
         does: &'static str,
     ) {
-        let began_ns = began_ns.unwrap_or(self.time_ns);
         let took_ns = self.time_ns - began_ns;
         if took_ns < duration_ns {
             self.find(Kind::Grip, robot, task, |robot, task| {

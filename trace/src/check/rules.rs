@@ -37,6 +37,8 @@ pub(super) enum Grip {
     Closing(u64),
     /// It opens since this time, ns.
     Opening(u64),
+    /// Batches are missing: nobody knows whether it moves, and since when.
+    Unknown,
 }
 
 /// An object a robot is leaving.
@@ -128,7 +130,7 @@ impl Rules {
                 claim: robot.task,
                 holding: robot.holding,
                 grasp: robot.holding.map_or_else(Vector2::zeros, held),
-                grip: Grip::Still,
+                grip: Grip::Unknown,
                 leaving: Vec::new(),
             };
         }

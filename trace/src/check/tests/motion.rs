@@ -7,7 +7,7 @@ use super::{OBJECT, ROBOT};
 use crate::check::checker::Checker;
 use crate::check::report::{Kind, Who};
 use crate::reader::{Close, Span};
-use crate::record::{BodyKind, Gap, Mark, Outcome};
+use crate::record::{BodyKind, Gap, Happening, Mark, Outcome};
 
 #[test]
 fn a_clean_run_is_clean() {
@@ -129,6 +129,42 @@ fn held_objects_move_rigidly() {
         .moves(BodyKind::Object, 0, Vector2::new(0.4, 0.0), 0.8)
         .wait_s(0.8);
     assert!(late.kinds().contains(&Kind::Rigidity));
+}
+
+/// A grip that began in a gap may end right after it, and what is done after that is held to the
+/// rules again.
+#[test]
+fn of_a_grip_that_began_in_a_gap_nobody_knows_how_long_it_took() {
+    let slow = || {
+        let mut scene = scene();
+        (scene.robot.grasp_ns, scene.robot.release_ns) = (0, 1_000_000_000);
+        scene
+    };
+    let told = |again: fn(Story) -> Story| {
+        let before = Story::fetched(slow());
+        let tick = before.now_ns / TICK_NS;
+        // The grip has begun to open before this.
+        let mut story = Story::fetched(slow())
+            .go(0, Some(0), 6.0, 1.55)
+            .show(Some(0), Some(0));
+        let shown = story.states[0].tick;
+        (story.motions, story.events) = (Vec::new(), Vec::new());
+        let mut checker = Checker::new(slow());
+        checker.span(before.span());
+        let gap = Gap {
+            after_tick: tick,
+            before_tick: shown + 1,
+            batches: shown - tick,
+        };
+        checker.span(empty(Close::Gap(gap)));
+        let story = story.wait_s(0.3).event(Happening::Released { robot: 0, task: 0 });
+        checker.span(again(story).span());
+        let kinds = checker.finish(true).violations.into_iter();
+        kinds.map(|violation| violation.kind).collect::<Vec<_>>()
+    };
+    assert_eq!(told(|story| story), []);
+    let in_no_time = |story: Story| story.claim(0, 0).grasp(0, 0).release(0, 0);
+    assert_eq!(told(in_no_time), [Kind::Grip]);
 }
 
 /// The clean run with its middle missing: what lies before and after is checked, and the state
