@@ -157,7 +157,9 @@ fn of_a_grip_that_began_in_a_gap_nobody_knows_how_long_it_took() {
             batches: shown - tick,
         };
         checker.span(empty(Close::Gap(gap)));
-        let story = story.wait_s(0.3).event(Happening::Released { robot: 0, task: 0 });
+        let story = story
+            .wait_s(0.3)
+            .event(Happening::Released { robot: 0, task: 0 });
         checker.span(again(story).span());
         let kinds = checker.finish(true).violations.into_iter();
         kinds.map(|violation| violation.kind).collect::<Vec<_>>()
