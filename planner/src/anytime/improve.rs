@@ -27,6 +27,8 @@ const WANDERING: usize = 30;
 const UNITS_PER_ORDER: u64 = 4;
 /// Comparing a move with another one, in work units.
 const UNITS_PER_PAIR: usize = 4;
+/// Intermediate places by which moves far away differ from those of the best order, at most.
+const MOST_STRAYED: u32 = 3;
 /// How often in a row nothing may be left to try near the best order until that counts as all.
 const MOST_MISSES: u32 = 300;
 
@@ -40,25 +42,18 @@ impl Solver {
         self.turn += 1;
         let chosen = match self.turn % 3 {
             // The order of the first plan itself, whose ways were looked for in haste.
-            _ if self.tried.insert(order.clone()) => Some((hops, order)),
+            _ if self.tried.insert(&hops, &order) => Some((hops, order)),
             0 => self.set_aside(scene, &hops, &order, best),
             1 => self.descend(hops, &order, best),
             _ => self.reorder(hops, &order, best),
         };
         let Some((hops, near)) = chosen else {
             self.misses += 1;
-            self.go_back();
+            self.stray(scene);
             return self.misses < MOST_MISSES;
         };
         self.misses = 0;
-        // A little worse is good enough to go on from: what is better may lie behind it.
-        let limit = best + best / 32;
-        if let Some(makespan) = self.decode(scene, &hops, &near, limit) {
-            let is_of_other_moves =
-                (self.current.as_ref()).is_none_or(|(current, _)| !Rc::ptr_eq(current, &hops));
-            if is_of_other_moves {
-                self.tried.clear();
-            }
+        if let Some(makespan) = self.decode(scene, &hops, &near, worst(best)) {
             self.current = Some((hops, near));
             if makespan < best {
                 let source = self.current.clone();
@@ -83,12 +78,12 @@ impl Solver {
                 continue;
             };
             let is_better = chosen.as_ref().is_none_or(|(known, _)| least < *known);
-            if least < best && is_better && !self.is_hopeless(&hops, &near) {
+            if least < best && is_better && !self.is_hopeless(&hops, &near, best) {
                 chosen = Some((least, near));
             }
         }
         let (_, near) = chosen?;
-        self.tried.insert(near.clone());
+        self.tried.insert(&hops, &near);
         Some((hops, near))
     }
 
@@ -105,12 +100,12 @@ impl Solver {
             }
             if let Some(least) = hops.least(&near)
                 && (least <= known || step < WANDERING)
-                && !self.is_hopeless(&hops, &near)
+                && !self.is_hopeless(&hops, &near, best)
             {
                 (found, known) = (near, least);
             }
         }
-        let is_new = known < best && self.tried.insert(found.clone());
+        let is_new = known < best && self.tried.insert(&hops, &found);
         is_new.then_some((hops, found))
     }
 
@@ -122,23 +117,38 @@ impl Solver {
         order: &[Item],
         best: Time,
     ) -> Option<Source> {
+        let (hops, order) = self.vary(scene, hops, order)?;
+        let promises = hops.least(&order)? < best
+            && !self.is_hopeless(&hops, &order, best)
+            && self.tried.insert(&hops, &order);
+        promises.then_some((hops, order))
+    }
+
+    /// Goes on from moves like those of the best order but for a few intermediate places, whatever
+    /// they promise.
+    fn stray(&mut self, scene: &Scene) {
+        self.go_back();
+        for _ in 0..self.random.random_range(0..=MOST_STRAYED) {
+            let Some((hops, order)) = self.current.clone() else {
+                return;
+            };
+            self.current = self.vary(scene, &hops, &order).or(Some((hops, order)));
+        }
+    }
+
+    /// Moves and an order like these but for an intermediate place.
+    fn vary(&mut self, scene: &Scene, hops: &Hops, order: &[Item]) -> Option<Source> {
         // Its moves are compared with each other anew.
         self.weigh(hops, ORDERS_LOOKED_AT + UNITS_PER_PAIR * hops.list.len());
-        let (hops, order) = vary(
-            scene,
-            &mut self.ground,
-            &self.start,
-            &self.homes,
-            (hops, order),
-            &mut self.random,
-        )?;
-        let promises = hops.least(&order)? < best && !self.cuts.forbid(&hops, &order);
-        promises.then(|| (Rc::new(hops), order))
+        let (ground, start, homes) = (&mut self.ground, &self.start, &self.homes);
+        let near = (hops, order);
+        let (hops, order) = vary(scene, ground, start, homes, near, &mut self.random)?;
+        Some((Rc::new(hops), order))
     }
 
     /// Whether an order was tried before, or is known to lead nowhere.
-    fn is_hopeless(&self, hops: &Hops, order: &[Item]) -> bool {
-        self.tried.contains(order) || self.cuts.forbid(hops, order)
+    fn is_hopeless(&self, hops: &Hops, order: &[Item], best: Time) -> bool {
+        self.tried.has(hops, order, worst(best)) || self.cuts.forbid(hops, order)
     }
 
     /// Pays for looking at so many orders.
@@ -154,10 +164,16 @@ impl Solver {
     }
 }
 
+/// A little worse than the best is good enough to go on from: what is better may lie behind it.
+const fn worst(best: Time) -> Time {
+    best + best / 32
+}
+
 #[cfg(test)]
 mod tests {
-    use scene::GenerateOptions;
+    use scene::{GenerateOptions, Vec2};
 
+    use crate::anytime::order::Hops;
     use crate::anytime::solver::testing::planned;
     use crate::{BoundLimits, Bounds};
 
@@ -183,5 +199,33 @@ mod tests {
             found_s < r_s
         });
         assert!(is_beaten);
+    }
+
+    /// By object that is moved, where it is in the end.
+    fn ends(hops: &Hops) -> impl Iterator<Item = (usize, Vec2)> {
+        let lasts = hops.of.iter().filter(|(first, end)| first < end);
+        lasts.map(|&(_, end)| (hops.list[end - 1].object, hops.list[end - 1].to.at))
+    }
+
+    #[test]
+    fn straying_leads_by_other_intermediate_places_to_the_same_ends() {
+        let mut most = 0;
+        for seed in 0..6 {
+            let (scene, mut solver, best) = planned(&GenerateOptions {
+                seed,
+                crowding: 0.8,
+                ..GenerateOptions::default()
+            });
+            let (hops, _) = solver.current.clone().unwrap();
+            for _ in 0..50 {
+                solver.stray(&scene);
+                let (strayed, order) = solver.current.clone().unwrap();
+                assert_eq!(strayed.list.len(), order.len());
+                assert!(ends(&hops).eq(ends(&strayed)));
+                most = most.max(strayed.list.len().saturating_sub(hops.list.len()));
+            }
+            assert_eq!(solver.best.unwrap().makespan, best);
+        }
+        assert!((2..=super::MOST_STRAYED as usize).contains(&most), "{most}");
     }
 }

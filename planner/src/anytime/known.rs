@@ -9,14 +9,15 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
+use crate::anytime::order::Item;
 use crate::anytime::route::Piece;
-use crate::anytime::track::Move;
+use crate::anytime::track::{Move, Place};
 
 /// Most pieces of ways that are kept; then all are forgotten.
 const MOST_PIECES: usize = 1 << 21;
 
-/// The move: its object, robot, where to (the bits of both coordinates), by which grasp.
-type Key = (usize, usize, [u64; 2], u8);
+/// A move: its object, robot, where to (the bits of both coordinates), by which grasp.
+pub(crate) type Key = (u32, u32, [u64; 2], u8);
 
 /// The number of a beginning: the moves that were committed. 0 is none.
 type Beginning = usize;
@@ -49,24 +50,30 @@ impl Known {
 
     /// The way of the move that comes next, if it is known.
     pub(crate) fn way(&self, wanted: &Move) -> Option<Rc<[Piece]>> {
-        let after = self.next.get(&(self.at?, key(wanted)))?;
+        let after = self.next.get(&(self.at?, key_of(wanted)))?;
         Some(Rc::clone(&self.ways[after - 1]))
     }
 
     /// A move was committed, with this way.
     pub(crate) fn commit(&mut self, wanted: &Move, way: &[Piece]) {
         let Some(before) = self.at else { return };
-        let after = *self.next.entry((before, key(wanted))).or_insert_with(|| {
-            self.ways.push(way.into());
-            self.pieces += way.len();
-            self.ways.len()
-        });
+        let after = *self
+            .next
+            .entry((before, key_of(wanted)))
+            .or_insert_with(|| {
+                self.ways.push(way.into());
+                self.pieces += way.len();
+                self.ways.len()
+            });
         self.at = Some(after);
     }
 }
 
-fn key(wanted: &Move) -> Key {
-    let at = wanted.to.at;
-    let bits = [at.x.to_bits(), at.y.to_bits()];
-    (wanted.object, wanted.robot, bits, wanted.to.by)
+pub(crate) fn key((object, robot): Item, to: &Place) -> Key {
+    let bits = [to.at.x.to_bits(), to.at.y.to_bits()];
+    (object, robot, bits, to.by)
+}
+
+fn key_of(wanted: &Move) -> Key {
+    key((wanted.object as u32, wanted.robot as u32), &wanted.to)
 }

@@ -33,6 +33,7 @@ mod situation;
 mod solver;
 mod timeline;
 mod track;
+mod tried;
 
 use scene::{Budget, Scene, Settings};
 use shm_types::{Checked, Counters, RobotSchedule, RobotState, Schedule, Verdict, WorldSnapshot};

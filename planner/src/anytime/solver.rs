@@ -12,7 +12,6 @@ pub(super) mod testing;
 mod tests;
 mod under_way;
 
-use std::collections::HashSet;
 use std::rc::Rc;
 
 use rand::SeedableRng;
@@ -32,6 +31,7 @@ use crate::anytime::sequence::{Sequencer, Step};
 use crate::anytime::shortest::Shortest;
 use crate::anytime::situation::Situation;
 use crate::anytime::track::{Move, Place, Start, Track};
+use crate::anytime::tried::Tried;
 use crate::anytime::{
     UNITS_PER_CONFIGURATION, UNITS_PER_INTERVAL, UNITS_PER_PIECE, UNITS_PER_SMALL_CONFIGURATION,
 };
@@ -126,7 +126,7 @@ pub(crate) struct Solver {
     pub(super) misses: u32,
     /// How often improving was tried.
     pub(super) turn: u32,
-    pub(super) tried: HashSet<Vec<Item>>,
+    pub(super) tried: Tried,
     pub(crate) decoded: u64,
     /// Units spent on looking at orders, and on making moves again that were found before.
     pub(super) weighing: u64,
@@ -198,7 +198,7 @@ impl Solver {
             current: None,
             misses: 0,
             turn: 0,
-            tried: HashSet::new(),
+            tried: Tried::default(),
             decoded: 0,
             weighing: 0,
             known: Known::default(),
@@ -390,6 +390,7 @@ impl Solver {
             if !self.commit(scene, hops, &order[..place], item, home_by[place]) {
                 let (ground, sequencer) = (&self.ground, &mut self.sequencer);
                 (self.cuts).learn(ground, sequencer, hops, &order[..place], item);
+                self.tried.fail(hops, &order[..=place], home_by[place]);
                 return None;
             }
         }

@@ -1,6 +1,7 @@
 //! What reservations have to be true to.
 
 use std::collections::BTreeSet;
+use std::collections::HashSet;
 
 use scene::Vec2;
 
@@ -555,4 +556,28 @@ fn where_interchangeable_objects_cannot_get_to_the_goals_given_first_they_get_ot
         assert!(ends.is_superset(&BTreeSet::from([11, 13])), "{ends:?}");
     }
     assert_eq!(in_turn, 1);
+}
+
+#[test]
+fn what_was_tried_is_known_after_robots_have_begun_some_of_it() {
+    let mut begun = 0;
+    for seed in 0..6 {
+        let (scene, mut solver, _) = planned(&scene::GenerateOptions {
+            seed,
+            ..scene::GenerateOptions::default()
+        });
+        for _ in 0..10 {
+            solver.improve(&scene);
+        }
+        let script = written(&scene, &mut solver);
+        let (_, before) = solver.best.clone().unwrap().source.unwrap();
+        solver.current = solver.best.clone().unwrap().source;
+        let until = solver.plan.makespan() / 3;
+        if solver.go_on(&scene, until, |tracks| kept(&script, tracks, until)) {
+            let (hops, order) = solver.current.clone().unwrap();
+            begun += before.len() - order.len();
+            assert!(solver.tried.has(&hops, &order, EVER), "{seed}: {order:?}");
+        }
+    }
+    assert!(begun > 0);
 }

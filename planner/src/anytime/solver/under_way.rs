@@ -8,10 +8,11 @@ use std::rc::Rc;
 use scene::Scene;
 
 use crate::anytime::ground::Time;
-use crate::anytime::order::Hops;
+use crate::anytime::order::{Hops, Item, Progress};
 use crate::anytime::sequence::Step;
-use crate::anytime::solver::{Best, Solver};
+use crate::anytime::solver::{Best, Solver, Source};
 use crate::anytime::track::{Start, Track};
+use crate::anytime::tried::Begun;
 
 impl Solver {
     /// Keeps so many deeds of each robot of the plan that is followed, as `kept` says, and looks
@@ -25,7 +26,7 @@ impl Solver {
         let Some(followed) = self.followed.clone() else {
             return false;
         };
-        let Some((hops, followed_order)) = &followed.source else {
+        let Some(source) = &followed.source else {
             return false;
         };
         let kept = kept(&followed.tracks);
@@ -40,35 +41,46 @@ impl Solver {
         kept.iter_mut()
             .zip(&before)
             .for_each(|(kept, before)| *kept -= before);
-        let mut made = vec![0; kept.len()];
-        let mut order = Vec::new();
-        let mut sequence: Vec<Step> = Vec::new();
-        for &(object, robot) in followed_order {
-            let index = object as usize;
-            if made[index] >= kept[index] {
-                let hop = hops.of[index].0 + made[index] as usize;
-                order.push((object, robot));
-                sequence.push((index, Rc::clone(&hops.list[hop].to)));
-            }
-            made[index] += 1;
-        }
-        if order.is_empty() {
+        let begun = Begun::of(&source.0, &source.1, &kept);
+        let Some((sequence, order)) =
+            rest_of(&begun, source).filter(|(_, order)| !order.is_empty())
+        else {
             return false;
-        }
+        };
         self.known.clear();
         let (start, homes) = (&self.start, &self.homes);
         let Some(hops) = Hops::new(scene, &mut self.ground, start, homes, &sequence) else {
             return false;
         };
-        self.current = Some((Rc::new(hops), order));
-        self.tried.clear();
+        let rest = (Rc::new(hops), order);
+        let current = self.wander_on(scene, &begun, source, &rest);
+        self.current = current.or_else(|| Some(rest.clone()));
         self.misses = 0;
         self.best = Some(Best {
-            source: self.current.clone(),
+            source: Some(rest),
             ..followed
         });
         self.followed.clone_from(&self.best);
         true
+    }
+
+    /// Where orders were looked for, if robots have begun as they do there: what is left of it.
+    fn wander_on(
+        &mut self,
+        scene: &Scene,
+        begun: &Begun,
+        followed: &Source,
+        rest: &Source,
+    ) -> Option<Source> {
+        self.tried.go_on(begun);
+        let current = self.current.take()?;
+        let (sequence, order) = rest_of(begun, &current)?;
+        if Rc::ptr_eq(&current.0, &followed.0) {
+            return Some((Rc::clone(&rest.0), order));
+        }
+        let (start, homes) = (&self.start, &self.homes);
+        let hops = Hops::new(scene, &mut self.ground, start, homes, &sequence)?;
+        Some((Rc::new(hops), order))
     }
 
     /// What robots do in the plan that they follow.
@@ -88,4 +100,18 @@ impl Solver {
     pub(crate) fn accept_better(&mut self) {
         self.followed.clone_from(&self.best);
     }
+}
+
+/// What is left of moves and an order of them once some have begun; none if it is not one in which
+/// they have.
+fn rest_of(begun: &Begun, (hops, order): &Source) -> Option<(Vec<Step>, Vec<Item>)> {
+    let rest = begun.rest(hops, order)?;
+    let mut progress = Progress::new(hops);
+    let numbers: Vec<usize> = order.iter().map(|&item| progress.make(item)).collect();
+    let step = |&place: &usize| {
+        let hop = &hops.list[numbers[place]];
+        (hop.object, Rc::clone(&hop.to))
+    };
+    let sequence = rest.iter().map(step).collect();
+    Some((sequence, rest.iter().map(|&place| order[place]).collect()))
 }
