@@ -5,7 +5,8 @@
 //! Not responsible for: how long an order takes (`plan`), the plan itself (`solver`).
 //!
 //! How: the three take turns. Where robots hardly meet, the time that an order takes with the walls
-//! alone tells good ones from bad ones; where they do, only trying does.
+//! alone tells good ones from bad ones; where they do, only trying does. Nothing is tried twice. Once
+//! nothing is left, they go on near moves by some other intermediate places, whatever these promise.
 
 use std::rc::Rc;
 
