@@ -52,6 +52,11 @@ impl Life {
             is_held_up: is_held_up(&text)?,
         })
     }
+
+    /// Whether the process has done something since, or could not for want of a core or a disk.
+    pub(crate) fn goes_on_since(self, before: Self) -> bool {
+        self != before || self.is_held_up
+    }
 }
 
 /// Whether a process is ready to run or in uninterruptible sleep, by its `/proc/PID/stat`.
@@ -238,5 +243,19 @@ mod tests {
             assert_eq!(is_held_up(&stat), Some(expected), "{stat}");
         }
         assert_eq!(is_held_up("7 (a"), None);
+    }
+
+    #[test]
+    fn who_is_held_up_goes_on_though_it_does_nothing() {
+        let idle = Life::default();
+        let (busy, held_up) = (
+            Life { used_ns: 1, ..idle },
+            Life {
+                is_held_up: true,
+                ..idle
+            },
+        );
+        assert!(!idle.goes_on_since(idle) && busy.goes_on_since(idle));
+        assert!(held_up.goes_on_since(held_up));
     }
 }

@@ -290,7 +290,7 @@ impl Run<'_> {
         let now = Instant::now();
         if now.duration_since(one.idle.1) > LIFE_EVERY
             && let Some(life) = one.process.as_ref().and_then(Participant::life)
-            && (life != one.idle.0 || life.is_held_up)
+            && life.goes_on_since(one.idle.0)
         {
             one.idle = (life, now);
         }

@@ -42,7 +42,7 @@ impl Solver {
         let best = best.makespan;
         self.turn += 1;
         let chosen = match self.turn % 3 {
-            // The order of the first plan itself, whose ways were looked for in haste.
+            // That of the first plan itself, whose ways were looked for in haste, or one strayed to.
             _ if self.tried.insert(&hops, &order) => Some((hops, order)),
             0 => self.set_aside(scene, &hops, &order, best),
             1 => self.descend(hops, &order, best),

@@ -65,11 +65,10 @@ impl Tried {
         let Some(hash) = hashes(order.iter().copied()).last() else {
             return false;
         };
-        let before = self.too_late.insert(hash, time);
-        if let Some(before) = before.filter(|&before| before >= time) {
-            self.too_late.insert(hash, before);
+        if (self.too_late.get(&hash)).is_some_and(|&known| known >= time) {
             return false;
         }
+        self.too_late.insert(hash, time);
         self.moves += order.len();
         self.list.push((order, time));
         true
@@ -82,11 +81,14 @@ pub(crate) struct Begun(Vec<Vec<Key>>);
 impl Begun {
     /// So many moves of each object, as in this order.
     pub(crate) fn of(hops: &Hops, order: &[Item], made: &[u32]) -> Self {
-        let of_object = |(object, &made): (usize, &u32)| {
-            let moves = keys(hops, order).filter(|key| key.0 as usize == object);
-            moves.take(made as usize).collect()
-        };
-        Self(made.iter().enumerate().map(of_object).collect())
+        let mut begun = vec![Vec::new(); made.len()];
+        for key in keys(hops, order) {
+            let object = key.0 as usize;
+            if begun[object].len() < made[object] as usize {
+                begun[object].push(key);
+            }
+        }
+        Self(begun)
     }
 
     /// The places in an order of the moves that come after them.
