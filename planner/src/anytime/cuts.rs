@@ -14,6 +14,7 @@
 
 use std::borrow::Cow;
 use std::collections::HashMap;
+use std::ops::Range;
 
 use scene::{ROBOT_ALONE, Vec2};
 
@@ -44,6 +45,9 @@ enum Body {
 /// A body, and the lattice points that it closes to a leg.
 type Closing<'a> = (Body, Cow<'a, [u32]>);
 
+/// What the objects that are said apart close to a leg.
+type Own<'a> = [&'a [u32]; 2];
+
 /// What was learned.
 #[derive(Default)]
 pub(crate) struct Cuts {
@@ -58,23 +62,41 @@ impl Cuts {
             return false;
         }
         let mut progress = Progress::new(hops);
-        order.iter().any(|&item| {
-            let is_cut = self.forbid_next(hops, &progress, item);
+        order.iter().enumerate().any(|(place, &item)| {
+            // Whoever has no way home may have one later.
+            let needed = if place + 1 == order.len() { 0..3 } else { 0..2 };
+            let is_cut = self.cut(hops, &progress, item, needed);
             progress.make(item);
             is_cut
         })
     }
 
-    fn forbid_next(&self, hops: &Hops, progress: &Progress, item: Item) -> bool {
+    /// Whether the robot that makes the move that comes after an order is known to have no way home
+    /// then, but a way to make it.
+    pub(crate) fn shut_in(&self, hops: &Hops, order: &[Item], item: Item) -> bool {
+        if self.by_leg.is_empty() {
+            return false;
+        }
+        let mut progress = Progress::new(hops);
+        for &made in order {
+            progress.make(made);
+        }
+        self.cut(hops, &progress, item, 2..3) && !self.cut(hops, &progress, item, 0..2)
+    }
+
+    /// Whether one of these legs of a move is known to be closed.
+    fn cut(&self, hops: &Hops, progress: &Progress, item: Item, needed: Range<usize>) -> bool {
         let stands = |body: &Body| match *body {
             Body::Object(object, at) => progress.place(hops, object).at == at,
             Body::Robot(robot, cell) => {
                 robot != item.1 as usize && progress.unmoved(hops, robot) == Some(cell)
             }
         };
-        legs(hops, progress, item).into_iter().flatten().any(|leg| {
-            let cuts = self.by_leg.get(&leg.0);
-            cuts.is_some_and(|cuts| cuts.iter().any(|cut| cut.iter().all(stands)))
+        legs(hops, progress, item).is_some_and(|legs| {
+            legs[needed].iter().any(|leg| {
+                let cuts = self.by_leg.get(&leg.0);
+                cuts.is_some_and(|cuts| cuts.iter().any(|cut| cut.iter().all(stands)))
+            })
         })
     }
 
@@ -122,10 +144,10 @@ impl Leg {
         self,
         ground: &Ground,
         sequencer: &mut Sequencer,
-        own: &[u32],
+        own: Own<'_>,
         bodies: &[Closing<'_>],
     ) -> bool {
-        let closed = bodies.iter().map(|(_, cells)| &**cells).chain([own]);
+        let closed = bodies.iter().map(|(_, cells)| &**cells).chain(own);
         sequencer.finds_among(ground, self.class, (self.from, self.to), closed)
     }
 }
@@ -155,13 +177,13 @@ fn standing<'a>(
     objects.chain(robots).collect()
 }
 
-/// Approach, transfer and way home of a move, and what its own object closes to each; none if its
-/// robot is gone.
+/// Approach, transfer and way home of a move, and what its own object and the one that its robot
+/// comes from close to each; none if the robot is gone.
 fn legs<'a>(
     hops: &'a Hops,
     progress: &Progress,
     (object, robot): Item,
-) -> Option<[(Leg, &'a [u32]); 3]> {
+) -> Option<[(Leg, Own<'a>); 3]> {
     let (object, robot) = (object as usize, robot as usize);
     let hop = &hops.list[progress.next(object)];
     let (begin, left) = progress.begins(hops, robot)?;
@@ -175,15 +197,19 @@ fn legs<'a>(
     let approach = leg(alone, begin, hop.from.grasp, left);
     let transfer = leg(hop.class, hop.from.grasp, hop.to.grasp, None);
     let back = leg(alone, hop.to.grasp, home, None);
+    let behind = left.filter(|_| progress.unmoved(hops, robot).is_none());
+    let behind = behind.map_or(&[][..], |object| &progress.place(hops, object).bare);
     Some([
-        (approach, &hop.from.bare),
-        (transfer, &[]),
-        (back, &hop.to.bare),
+        (approach, [&hop.from.bare, behind]),
+        (transfer, [&[]; 2]),
+        (back, [&hop.to.bare, &[]]),
     ])
 }
 
 #[cfg(test)]
 mod tests {
+    use std::rc::Rc;
+
     use rand::RngExt;
     use rand::seq::SliceRandom;
     use scene::GenerateOptions;
@@ -191,7 +217,8 @@ mod tests {
     use super::*;
     use crate::anytime::ground::EVER;
     use crate::anytime::solver::Solver;
-    use crate::anytime::solver::testing::{cells, planned, planned_for};
+    use crate::anytime::solver::testing::{cells, planned, planned_for, solver_of};
+    use crate::anytime::track::Place;
 
     /// Carries an order out; whether it can be, and whether that was foreseen.
     fn tried(scene: &scene::Scene, solver: &mut Solver, order: &[Item]) -> (bool, bool) {
@@ -269,6 +296,46 @@ mod tests {
         assert_eq!(tried(&scene, &mut solver, &from_above), (false, false));
         assert_eq!(tried(&scene, &mut solver, &from_above), (false, true));
         assert_eq!(tried(&scene, &mut solver, &[(0, 0)]), (true, false));
+    }
+
+    /// A corridor, up which the robot brings one object; that and the other one then leave it no way
+    /// home.
+    const SHUT_IN: &str = r#"
+        name = "shut-in"
+        [robot]
+        shape = { box = [0.5, 0.5] }
+        speed = 0.5
+        [object]
+        shape = { box = [0.4, 0.4] }
+        pass_under = false
+        [workspace]
+        bounds = [0.0, 0.0, 1.2, 4.0]
+        [[robots]]
+        home = [0.6, 3.5]
+        [[objects]]
+        start = [0.3, 1.1]
+        goal = [0.3, 2.0]
+        [[objects]]
+        start = [0.9, 2.0]
+        goal = [0.9, 0.8]
+    "#;
+
+    #[test]
+    fn whoever_is_shut_in_stays_away_if_a_later_move_lets_it_home() {
+        let scene = scene::parse(SHUT_IN, "shut-in").unwrap();
+        let mut solver = solver_of(&scene);
+        let goal = |object: usize| {
+            let at = scene.objects[object].goal.unwrap();
+            (object, Place::of(&scene, &solver.ground, object, at))
+        };
+        let each_once = [goal(0), goal(1)];
+        let (ground, start, homes) = (&mut solver.ground, &solver.start, &solver.homes);
+        let hops = Hops::new(&scene, ground, start, homes, &each_once).unwrap();
+        solver.current = Some((Rc::new(hops), Vec::new()));
+        assert_eq!(tried(&scene, &mut solver, &[(0, 0), (1, 0)]), (true, false));
+        assert_eq!(tried(&scene, &mut solver, &[(0, 0), (1, 0)]), (true, false));
+        assert_eq!(tried(&scene, &mut solver, &[(0, 0)]), (false, true));
+        assert_eq!(tried(&scene, &mut solver, &[(1, 0), (0, 0)]), (true, false));
     }
 
     #[test]

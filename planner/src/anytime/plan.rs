@@ -18,10 +18,13 @@ use std::rc::Rc;
 use scene::{Event, ROBOT_ALONE, Scene, Vec2};
 
 use crate::anytime::ground::{EVER, Ground, Time};
+use crate::anytime::rounds::MOST_PATIENCE_S;
 use crate::anytime::route::{Leg, Piece, Quest, Router, Target, Then, sides};
 use crate::anytime::timeline::{Owner, Resting, Timeline};
-use crate::anytime::track::{Deed, Left, Move, Place, Rest, Start, Track};
+use crate::anytime::track::{Deed, Ends, Left, Move, Place, Rest, Start, Track};
 
+/// A robot that would wait for longer at a grasp has not begun it, s.
+pub(super) const LONG_WAIT_S: f64 = 1.0;
 /// No object.
 const NOTHING: Resting = (Owner::MAX, 0);
 
@@ -33,8 +36,6 @@ pub(crate) struct Plan {
     tracks: Vec<Track>,
     rests: Vec<Rest>,
     way: Vec<Piece>,
-    /// Whether a move may leave its robot elsewhere than at home.
-    pub(crate) leaves_away: bool,
 }
 
 impl Plan {
@@ -46,7 +47,6 @@ impl Plan {
             tracks: Vec::new(),
             rests: Vec::new(),
             way: Vec::new(),
-            leaves_away: false,
         }
     }
 
@@ -133,20 +133,49 @@ impl Plan {
         let clear = self.clear_from(ground, wanted.robot, &wanted.to).ok()?;
         let mut legs = self.legs(ground, wanted, clear);
         let mut way = std::mem::take(&mut self.way);
-        let mut found = router.find(
-            ground,
-            &self.timeline,
-            &self.quest(wanted, &legs, 0),
-            &mut way,
-        );
-        if found.is_none() && self.leaves_away {
-            legs[2].target = Target::Anywhere(None);
+        let mut found = None;
+        if wanted.ends != Ends::Anywhere {
             let quest = self.quest(wanted, &legs, 0);
             found = router.find(ground, &self.timeline, &quest, &mut way);
         }
-        let done = found.map(|_| self.enter_way(ground, wanted.robot, &way, Some(wanted)));
+        if found.is_none() && wanted.ends != Ends::AtHome {
+            let back = legs[2].ahead(wanted.to.grasp)?;
+            legs[2].target = Target::Anywhere(None);
+            let mut quest = self.quest(wanted, &legs, 0);
+            quest.limit = quest.limit.saturating_sub(back);
+            found = router.find(ground, &self.timeline, &quest, &mut way);
+        }
+        let done = found.map(|end| {
+            if router.is_hasty {
+                self.grasp_late(ground, router, wanted, &mut legs, end, &mut way);
+            }
+            self.enter_way(ground, wanted.robot, &way, Some(wanted))
+        });
         self.way = way;
         done
+    }
+
+    /// Lets a robot that would hold an object for long before it can put it down wait with free
+    /// hands instead, if it is done as soon: what it has not grasped yet can still be planned anew.
+    fn grasp_late(
+        &self,
+        ground: &Ground,
+        router: &mut Router,
+        wanted: &Move,
+        legs: &mut [Leg; 3],
+        end: Time,
+        way: &mut Vec<Piece>,
+    ) {
+        let Some(late) = late_grasp(ground, legs, way) else {
+            return;
+        };
+        legs[0].then = Then::Grasp(late);
+        let mut quest = self.quest(wanted, legs, 0);
+        quest.limit = end.saturating_add(1);
+        let mut later = Vec::new();
+        if (router.find(ground, &self.timeline, &quest, &mut later)).is_some() {
+            *way = later;
+        }
     }
 
     /// The legs of a move that begins where the robot's tail does; its object is put down no
@@ -449,4 +478,22 @@ fn closed_by(places: [Option<&Rc<Place>>; 2]) -> Vec<u32> {
     places
         .flat_map(|place| place.bare.iter().copied())
         .collect()
+}
+
+/// When the grasp of a move may begin at the latest, with the walls alone, if the object would be
+/// held for much longer than it takes to bring it to its place, from when plans still change.
+fn late_grasp(ground: &Ground, legs: &[Leg; 3], way: &[Piece]) -> Option<Time> {
+    let mut grips = way.iter().filter_map(|piece| match piece {
+        Piece::Grip(end) => Some(*end),
+        Piece::Step(..) => None,
+    });
+    let (grasped, released) = (grips.next()?, grips.next()?);
+    if grasped > ground.time(MOST_PATIENCE_S) {
+        return None;
+    }
+    let Target::Place(at, _) = legs[0].target else {
+        return None;
+    };
+    let late = released.checked_sub(legs[1].ahead(at)? + ground.release)?;
+    (late > grasped + ground.time(LONG_WAIT_S)).then(|| late - ground.grasp)
 }

@@ -11,13 +11,15 @@
 //! ring. Steps are joined where nothing is waited for, in either direction.
 
 mod needs;
+#[cfg(test)]
+mod tests;
 
 use scene::{CONTACT_M, Scene, Vec2, point};
 use shm_types::capacity::MAX_ACTIONS;
 use shm_types::{Action, Grip, NONE, RobotSchedule, Schedule, Wait};
 
 use crate::anytime::ground::{Ground, Time};
-use crate::anytime::plan::Plan;
+use crate::anytime::plan::{LONG_WAIT_S, Plan};
 use crate::anytime::publish::needs::{Need, add_user_order, needs_of};
 use crate::anytime::rounds::patience_s;
 use crate::anytime::situation::{RobotAt, Situation};
@@ -312,6 +314,10 @@ fn join(
             Deed::Grasped(object, turn, ..) => {
                 let from = stops.next().unwrap_or_else(|| scene.lattice.at(cell));
                 beside = joined.stop(deed, scene, cell, from);
+                if waits_early(ground, track, deed, can_change) {
+                    // The grasp may come to nothing.
+                    joined.begin(deed, point(from));
+                }
                 joined.grip(deed, from, Grip::Grasp, object, turn);
                 heading = None;
             }
@@ -342,6 +348,13 @@ fn join(
         .granted
         .push(joined.kept + joined.actions.len() as u32);
     joined
+}
+
+/// Whether a robot waits for long from some time before `until` on, before it grasps with this deed.
+fn waits_early(ground: &Ground, track: &Track, deed: usize, until: Time) -> bool {
+    let arrived = (deed.checked_sub(1)).map_or(0, |last| track.deeds[last].end());
+    let begun = track.deeds[deed].end().saturating_sub(ground.grasp);
+    arrived < until && begun > arrived + ground.time(LONG_WAIT_S)
 }
 
 /// Whether actions lead to the same places after the same waits.
@@ -409,126 +422,5 @@ impl Joined {
         if let Some(action) = self.actions.last_mut() {
             (action.grip, action.object, action.turn) = (grip.code(), object, turn);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use scene::Settings;
-    use shm_types::capacity::MAX_WAITS;
-    use shm_types::{Point, zeroed};
-
-    use super::*;
-    use crate::anytime::keep::kept;
-    use crate::anytime::solver::Solver;
-
-    fn ends_at_home(scene: &Scene, script: &Script) {
-        for (part, home) in script.robots.iter().zip(&scene.homes) {
-            let (last, _) = part.actions.last().unwrap();
-            assert!((scene::vec(last.to) - home).norm() <= CONTACT_M, "{last:?}");
-        }
-    }
-
-    #[test]
-    fn robots_that_only_stand_beside_their_homes_end_there_too() {
-        for seed in 0..6 {
-            let options = scene::GenerateOptions {
-                seed,
-                objects: 1,
-                robots: 3,
-                ..scene::GenerateOptions::default()
-            };
-            let scene = scene::generate(&options).unwrap().scene;
-            let mut situation = Situation::at_start(&scene);
-            let ground = Ground::new(&scene, &Settings::default(), Vec::new());
-            for robot in &mut situation.robots {
-                let beside = [
-                    [0.004, 0.003],
-                    [0.004, -0.003],
-                    [-0.004, 0.003],
-                    [-0.004, -0.003],
-                ];
-                let mut beside = beside.iter().map(|&by| robot.at + Vec2::from(by));
-                let is_free = |at: &Vec2| ground.entry(&scene, &[0], *at, &[]).is_some();
-                robot.at = beside.find(is_free).unwrap();
-            }
-            let mut solver = Solver::new(&scene, &Settings::default(), &situation).unwrap();
-            let makespan = (0..5).find_map(|attempt| solver.first(&scene, attempt));
-            solver.restore().unwrap();
-            let script = Script::of(&scene, &solver.ground, &solver.plan, &situation);
-            ends_at_home(&scene, &script);
-            let until = makespan.unwrap() / 3;
-            if solver.go_on(&scene, until, |tracks| kept(&script, tracks, until)) {
-                solver.improve(&scene);
-                solver.restore();
-                ends_at_home(&scene, &script.go_on(&scene, &solver.ground, &solver.plan));
-            }
-        }
-    }
-
-    /// A robot with more actions than a message has room for, each with so many waits.
-    fn script(actions: usize, waits: usize) -> Script {
-        let wait = Wait {
-            robot: 0,
-            actions: 0,
-        };
-        let listed = (0..actions).map(|number| {
-            let action = Action {
-                to: Point::new(number as f64, 0.0),
-                grip: Grip::Keep.code(),
-                object: NONE,
-                turn: 0,
-                first_wait: 0,
-                waits: 0,
-                reserved: 0,
-            };
-            (action, vec![wait; waits])
-        });
-        let part = Part {
-            first: 0,
-            begun: 0,
-            kept: 0,
-            actions: listed.collect(),
-        };
-        Script {
-            robots: vec![part],
-            granted: Vec::new(),
-            limits: vec![u32::MAX],
-            limited_until_tick: 0,
-        }
-    }
-
-    #[test]
-    fn a_long_plan_is_listed_from_what_is_granted_as_far_as_there_is_room() {
-        let script = script(MAX_ACTIONS + 100, 0);
-        let mut out: Box<Schedule> = zeroed();
-        for (granted, first, complete) in [(0, 0, 0), (50, 49, 0), (200, 199, 1)] {
-            script.write(|_| granted, &mut out);
-            let listed = out.robots[0];
-            assert_eq!((listed.first, listed.complete), (first, complete));
-            let end = u32::try_from(MAX_ACTIONS + 100).unwrap();
-            let expected = if complete == 1 {
-                end
-            } else {
-                first + MAX_ACTIONS as u32
-            };
-            assert_eq!(listed.first + listed.count, expected);
-            let action = out.action(0, first + 7).unwrap();
-            assert_eq!(action.to.x, f64::from(first + 7), "numbers go on");
-        }
-    }
-
-    #[test]
-    fn where_waits_have_no_room_fewer_actions_are_listed() {
-        let script = script(MAX_ACTIONS, 9);
-        let mut out: Box<Schedule> = zeroed();
-        script.write(|_| 0, &mut out);
-        let count = out.robots[0].count as usize;
-        assert!(
-            count * 9 <= MAX_WAITS && 2 * count * 9 > MAX_WAITS,
-            "{count}"
-        );
-        assert_eq!(out.wait_count as usize, count * 9);
-        assert_eq!(out.robots[0].complete, 0);
     }
 }

@@ -19,7 +19,7 @@ use crate::anytime::solver::Solver;
 /// Share of the makespan for which better plans are looked for while robots follow the first one.
 const PATIENCE: f64 = 0.06;
 /// At most, s.
-const MOST_PATIENCE_S: f64 = 10.0;
+pub(super) const MOST_PATIENCE_S: f64 = 10.0;
 /// World time that improving takes between two looks at where robots are, s.
 pub(super) const ROUND_S: f64 = 0.25;
 /// From when a round begins until robots may follow what it found, beyond its work, s.

@@ -408,7 +408,7 @@ impl Piece {
 impl Leg {
     /// The least time from a cell to the end of the leg; none if there is no way.
     #[inline]
-    fn ahead(&self, cell: u32) -> Option<Time> {
+    pub(crate) fn ahead(&self, cell: u32) -> Option<Time> {
         match &self.target {
             Target::Place(_, field) => field.time(cell),
             Target::Anywhere(_) => Some(0),

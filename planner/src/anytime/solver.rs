@@ -30,7 +30,7 @@ use crate::anytime::route::Router;
 use crate::anytime::sequence::{Sequencer, Step};
 use crate::anytime::shortest::Shortest;
 use crate::anytime::situation::Situation;
-use crate::anytime::track::{Move, Place, Start, Track};
+use crate::anytime::track::{Ends, Move, Place, Start, Track};
 use crate::anytime::tried::Tried;
 use crate::anytime::{
     UNITS_PER_CONFIGURATION, UNITS_PER_INTERVAL, UNITS_PER_PIECE, UNITS_PER_SMALL_CONFIGURATION,
@@ -318,8 +318,13 @@ impl Solver {
         self.begin();
         let mut offers = Offers::new(hops, sequence, self.homes.len(), self.mode.in_turn);
         let mut order: Vec<Item> = Vec::new();
+        let ends = if self.mode.leaves_away {
+            Ends::AtHomeIfPossible
+        } else {
+            Ends::AtHome
+        };
         while order.len() < sequence.len() {
-            let mut commits = |item| self.commit(scene, hops, &order, item, EVER);
+            let mut commits = |item| self.commit(scene, hops, &order, item, (EVER, ends));
             let item = offers.take_soonest(&mut commits)?;
             order.push(item);
         }
@@ -330,7 +335,6 @@ impl Solver {
     fn begin(&mut self) {
         self.decoded += 1;
         self.plan.begin(&self.ground, &self.start);
-        self.plan.leaves_away = self.mode.leaves_away;
         if self.mode.home_first {
             self.send_all_home();
         }
@@ -346,7 +350,7 @@ impl Solver {
         hops: &Hops,
         order: &[Item],
         (object, robot): Item,
-        home_by: Time,
+        (home_by, ends): (Time, Ends),
     ) -> bool {
         let made = order.iter().filter(|item| item.0 == object).count();
         let hop = &hops.list[hops.of[object as usize].0 + made];
@@ -356,6 +360,7 @@ impl Solver {
             to: Rc::clone(&hop.to),
             after: self.plan.user_order(scene, object as usize, hop.to.at),
             home_by,
+            ends,
         };
         let (plan, ground, router) = (&mut self.plan, &mut self.ground, &mut self.router);
         if self.mode.makes_room {
@@ -387,14 +392,32 @@ impl Solver {
         self.begin();
         let home_by = hops.home_by(order, limit);
         for (place, &item) in order.iter().enumerate() {
-            if !self.commit(scene, hops, &order[..place], item, home_by[place]) {
+            let (before, home_by) = (&order[..place], home_by[place]);
+            let ends = self.ends(hops, order, place);
+            let mut is_made = self.commit(scene, hops, before, item, (home_by, ends));
+            if !is_made {
                 let (ground, sequencer) = (&self.ground, &mut self.sequencer);
-                (self.cuts).learn(ground, sequencer, hops, &order[..place], item);
-                self.tried.fail(hops, &order[..=place], home_by[place]);
+                (self.cuts).learn(ground, sequencer, hops, before, item);
+                let now = self.ends(hops, order, place);
+                is_made = now != ends && self.commit(scene, hops, before, item, (home_by, now));
+            }
+            if !is_made {
+                self.tried.fail(hops, &order[..=place], home_by);
                 return None;
             }
         }
         self.send_all_home()
+    }
+
+    /// Where a robot is to be after a move of an order: at home, unless it is not the last one and
+    /// the robot is known to have no way home yet.
+    fn ends(&self, hops: &Hops, order: &[Item], place: usize) -> Ends {
+        let is_last = place + 1 == order.len();
+        if !is_last && self.cuts.shut_in(hops, &order[..place], order[place]) {
+            Ends::Anywhere
+        } else {
+            Ends::AtHome
+        }
     }
 
     /// Sends everybody home, as the last part of a plan. Where a robot is gone, the others may

@@ -66,6 +66,15 @@ pub(crate) struct Track {
     pub(crate) end: (u32, Time),
 }
 
+/// Where a robot is to be after a move, until its next one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Ends {
+    AtHome,
+    /// At home if there is a way, else anywhere.
+    AtHomeIfPossible,
+    Anywhere,
+}
+
 /// A move: which robot brings which object where.
 #[derive(Clone, Debug)]
 pub(crate) struct Move {
@@ -77,6 +86,7 @@ pub(crate) struct Move {
     /// When the robot has to be home again, if that is its last move; else when it would have to
     /// be, so that its other moves can follow in time.
     pub(crate) home_by: Time,
+    pub(crate) ends: Ends,
 }
 
 /// What a plan starts from.
