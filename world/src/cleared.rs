@@ -14,36 +14,59 @@ use shm_types::capacity::MAX_PATH_POINTS;
 use crate::bodies::Bodies;
 use crate::broad::Aabb;
 use crate::path::ARRIVAL_M;
-use crate::state::{Leaving, Robot, id};
+use crate::state::{Leaving, Robot};
 
 /// As far off a straight line (m) rounding may lead in one tick: over as many ticks as one piece
 /// of path takes it stays far below what divides touching from overlap.
 const ON_LINE_M: f64 = ARRIVAL_M / 1_000.0;
 
-/// What decides on an overlap besides where the robot is. Short, since it is read in every tick.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What decides on an overlap besides where the robot is. Short and without ways to be absent,
+/// since it is made and compared in every tick.
+#[derive(Clone, Copy, Debug)]
 struct Terms {
-    /// What is in its hand, and by which grasp: that is the class of the body.
-    hand: Option<u32>,
+    /// What is in its hand plus 1, or 0, and by which grasp: that is the class of the body.
+    hand: usize,
+    grasp: usize,
     holds: bool,
-    grasp: u32,
     /// The rest says what of the objects is an obstacle to it, and that none has come.
     put_downs: u64,
-    claim: Option<u32>,
+    /// What it claims plus 1, or 0.
+    claim: usize,
     leaving: Leaving,
 }
 
 impl Terms {
+    /// Of no robot: nothing is put down so often.
+    const NONE: Self = Self {
+        hand: 0,
+        grasp: 0,
+        holds: false,
+        put_downs: u64::MAX,
+        claim: 0,
+        leaving: Leaving::NONE,
+    };
+
     #[inline]
     fn of(bodies: &Bodies, robot: &Robot) -> Self {
         Self {
-            hand: robot.hand.object().map(id),
+            hand: robot.hand.object().map_or(0, |object| object + 1),
+            grasp: robot.grasp,
             holds: robot.hand.holding().is_some(),
-            grasp: id(robot.grasp),
             put_downs: bodies.ground.put_downs(),
-            claim: robot.claim.map(|claim| id(claim.task)),
+            claim: robot.claim.map_or(0, |claim| claim.task + 1),
             leaving: robot.leaving,
         }
+    }
+
+    /// Whether they are the same, all compared at once: they mostly are.
+    #[inline]
+    fn are(&self, other: &Self) -> bool {
+        (self.hand == other.hand)
+            & (self.grasp == other.grasp)
+            & (self.holds == other.holds)
+            & (self.put_downs == other.put_downs)
+            & (self.claim == other.claim)
+            & (self.leaving == other.leaving)
     }
 }
 
@@ -63,8 +86,8 @@ pub(crate) struct Change {
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Cleared {
-    /// On which terms; `None` if nothing is clear.
-    terms: Option<Terms>,
+    /// On which terms; [`Terms::NONE`] if nothing is clear.
+    terms: Terms,
     /// Where the robot is on it.
     at: Vec2,
     /// Whether something has changed since.
@@ -84,7 +107,7 @@ impl Cleared {
     pub(crate) fn nothing() -> Self {
         let nowhere = Aabb::around(Vec2::zeros(), Vec2::zeros());
         Self {
-            terms: None,
+            terms: Terms::NONE,
             at: Vec2::zeros(),
             has_changed: false,
             count: 0,
@@ -103,9 +126,7 @@ impl Cleared {
     /// what is in its hand, on the ground, and waived for it is the same.
     #[inline]
     pub(crate) fn compare(&mut self, scene: &Scene, bodies: &Bodies, robot: &Robot) -> bool {
-        let known = self
-            .terms
-            .is_some_and(|terms| terms == Terms::of(bodies, robot));
+        let known = self.terms.are(&Terms::of(bodies, robot));
         let strayed = !known || !self.follow(robot.track.corners());
         if strayed || !are_same(self.ahead(), robot.grant.points()) {
             self.find_change(scene, bodies, robot, strayed);
@@ -168,7 +189,7 @@ impl Cleared {
 
     /// What was compared is clear, of the grant the first `clear` points.
     pub(crate) fn accept(&mut self, bodies: &Bodies, robot: &Robot, clear: usize) {
-        self.terms = Some(Terms::of(bodies, robot));
+        self.terms = Terms::of(bodies, robot);
         self.region = self.now;
         self.at = robot.position;
         self.corners[..clear].copy_from_slice(&robot.grant.points()[..clear]);

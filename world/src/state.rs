@@ -70,6 +70,9 @@ const MAX_LEAVING: usize = 4;
 pub(crate) struct Leaving([Option<NonZero<u32>>; MAX_LEAVING]);
 
 impl Leaving {
+    /// None.
+    pub(crate) const NONE: Self = Self([None; MAX_LEAVING]);
+
     /// As an object is kept here: such slots are compared in one go, in every tick.
     const fn slot(object: usize) -> Option<NonZero<u32>> {
         NonZero::new(id(object) + 1)
