@@ -40,14 +40,16 @@ impl World {
             }
             let has_changed = cleared.change().is_some();
             changed += u64::from(has_changed);
-            holding += u64::from(robot.hand.holding().is_some());
             if found.is_none() {
                 found = self.check_motion(i, !has_changed);
-                found = found.or_else(|| self.check_hand(scene, i));
-                if found.is_none()
-                    && let Some(object) = robot.hand.holding()
-                {
-                    self.objects.touched().pass(object);
+            }
+            if let Some(object) = robot.hand.holding() {
+                holding += 1;
+                if found.is_none() {
+                    found = self.check_hand(scene, i, object);
+                    if found.is_none() {
+                        self.objects.touched().pass(object);
+                    }
                 }
             }
         }
@@ -104,9 +106,9 @@ impl World {
         (!on_grant || !on_track || !in_time).then_some(Violation::Motion { robot: id(i) })
     }
 
-    fn check_hand(&self, scene: &Scene, i: usize) -> Option<Violation> {
+    /// Robot `i` and the `object` that it holds.
+    fn check_hand(&self, scene: &Scene, i: usize, object: usize) -> Option<Violation> {
         let robot = &self.robots[i];
-        let object = robot.hand.holding()?;
         let held = &self.objects[object];
         let place = robot.place_of(scene, object);
         let agreed = held.holder == Some(i)
