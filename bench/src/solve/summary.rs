@@ -1,13 +1,16 @@
 //! What follows from the runs: shares, ratios, and every exception by name.
 //!
 //! Responsible for: who solved how many of which rooms, the rooms that the default method missed,
-//! how near R it comes, in which rooms one of the paper's four was faster, and whether the targets
-//! are reached.
-//! Not responsible for: the runs (`solve`). A target that is missed is reported so.
+//! how near R it comes, in which rooms one of the paper's four was faster.
+//! Not responsible for: the runs (`solve`), whether the targets are reached (`targets`).
 //!
 //! Terms: a *miss* is a room that a run did not solve, also where none is known to exist (table
 //! `rooms`). A ratio to R is taken where the room was solved and R is exact; the rooms left out are
 //! counted beside it.
+
+mod targets;
+#[cfg(test)]
+mod tests;
 
 use scene::Settings;
 
@@ -15,6 +18,8 @@ use super::rooms::Set;
 use super::{METHODS, Solved, yardstick};
 use crate::results::{Finding, Table, Value};
 use crate::stats::{Estimate, mean_interval};
+
+pub use targets::TARGET_RATIOS;
 
 /// Name of the table of shares.
 pub const SHARES: &str = "shares";
@@ -25,15 +30,6 @@ pub const MISSES: &str = "misses";
 /// Name of the table of rooms in which another method was faster.
 pub const SLOWER: &str = "slower";
 
-/// Share of all generated rooms that is to be solved.
-const TARGET_SHARE: f64 = 0.99;
-/// Mean ratio to R that is to be reached with 1, 2, 3 and 4 robots.
-pub const TARGET_RATIOS: [f64; 4] = [1.05, 1.15, 1.25, 1.35];
-/// Share of rooms in which none of the paper's four is to be faster.
-const TARGET_BEST: f64 = 0.99;
-/// By how much it may be faster in the others.
-const TARGET_EXCESS: f64 = 1.05;
-
 /// Rooms over which ratios are averaged: a name, and what belongs to it.
 pub const GROUPS: [(&str, &[Set]); 2] = [
     ("paper and seeded", &[Set::Paper, Set::Seeded]),
@@ -43,16 +39,13 @@ pub const GROUPS: [(&str, &[Set]); 2] = [
 /// Tables and findings of these rooms.
 #[must_use]
 pub fn of(solved: &[Solved]) -> (Vec<Table>, Vec<Finding>) {
-    let mut findings = vec![solved_share(solved)];
-    findings.extend((1..=TARGET_RATIOS.len()).map(|robots| ratio(solved, robots)));
-    findings.extend([not_slower(solved), worst(solved), still(solved)]);
     let tables = vec![
         shares(solved),
         ratios(solved),
         misses(solved),
         slower(solved),
     ];
-    (tables, findings)
+    (tables, targets::findings(solved))
 }
 
 /// The rooms of one set that exist.
@@ -338,266 +331,4 @@ fn slower(solved: &[Solved]) -> Table {
         table.push(row);
     }
     table
-}
-
-/// A share in words.
-fn share(part: usize, whole: usize) -> String {
-    format!(
-        "{part} of {whole} ({:.1} %)",
-        100.0 * part as f64 / whole.max(1) as f64
-    )
-}
-
-fn solved_share(solved: &[Solved]) -> Finding {
-    let rooms: Vec<_> = there(solved, Set::Generated).collect();
-    let count = |method: usize| {
-        let runs = rooms.iter().filter_map(|one| one.runs.as_ref().ok());
-        runs.filter(|runs| runs[method].is_solved()).count()
-    };
-    let others = (1..METHODS.len())
-        .map(|method| format!("{} {}", METHODS[method], share(count(method), rooms.len())));
-    let evidence = format!(
-        "{}; {}",
-        share(count(0), rooms.len()),
-        others.collect::<Vec<_>>().join(", ")
-    );
-    let reached = count(0) as f64 >= TARGET_SHARE * rooms.len() as f64;
-    Finding {
-        claim: format!(
-            "at least {} % of the generated rooms are solved",
-            TARGET_SHARE * 100.0
-        ),
-        held: (!rooms.is_empty()).then_some(reached),
-        evidence,
-    }
-}
-
-fn ratio(solved: &[Solved], robots: usize) -> Finding {
-    let target = TARGET_RATIOS[robots - 1];
-    let ratios = Ratios::of(solved, GROUPS[0].1, robots);
-    let mean = mean_interval(&ratios.to_r);
-    let evidence = mean.map_or_else(
-        || "no such room".to_owned(),
-        |mean| {
-            format!(
-                "{:.3} [{:.3}, {:.3}] over {} rooms; {} missed, {} not known to have a solution, {} without an exact R",
-                mean.value,
-                mean.low,
-                mean.high,
-                ratios.to_r.len(),
-                ratios.missed,
-                ratios.unknown,
-                ratios.inexact
-            )
-        },
-    );
-    let plural = if robots == 1 { "" } else { "s" };
-    Finding {
-        claim: format!(
-            "paper's and seeded rooms, {robots} robot{plural}: mean makespan at most {target} times R"
-        ),
-        held: mean.map(|mean| mean.value <= target),
-        evidence,
-    }
-}
-
-fn not_slower(solved: &[Solved]) -> Finding {
-    let all: Vec<_> = solved.iter().filter_map(excess).collect();
-    let slower = all.iter().filter(|excess| **excess > 1.0).count();
-    let kept = all.len() - slower;
-    let nearly = solved.iter().filter(|one| is_slower_by_a_tick(one)).count();
-    Finding {
-        claim: format!(
-            "in at least {} % of the rooms that one of the paper's four solves, none is faster",
-            TARGET_BEST * 100.0
-        ),
-        held: (!all.is_empty()).then_some(kept as f64 >= TARGET_BEST * all.len() as f64),
-        evidence: format!(
-            "{}; the others are in {SLOWER}.csv, {nearly} of them by a single tick",
-            share(kept, all.len())
-        ),
-    }
-}
-
-fn worst(solved: &[Solved]) -> Finding {
-    let all: Vec<_> = solved.iter().filter_map(excess).collect();
-    let worst = all.iter().copied().reduce(f64::max);
-    let missed = all.iter().filter(|excess| excess.is_infinite()).count();
-    let finite = all
-        .iter()
-        .copied()
-        .filter(|excess| excess.is_finite())
-        .reduce(f64::max);
-    Finding {
-        claim: format!(
-            "and never by more than {:.0} %",
-            (TARGET_EXCESS - 1.0) * 100.0
-        ),
-        held: worst.map(|worst| worst <= TARGET_EXCESS),
-        evidence: format!(
-            "worst {:.3} times the best of the four; {missed} rooms that one of them solves were missed",
-            finite.unwrap_or(f64::NAN)
-        ),
-    }
-}
-
-fn still(solved: &[Solved]) -> Finding {
-    let runs: Vec<_> = there(solved, Set::Paper)
-        .filter_map(Solved::anytime)
-        .collect();
-    let ticks: u64 = runs.iter().map(|run| run.computing_after_ticks).sum();
-    let first_s: Vec<_> = runs.iter().filter_map(|run| run.first_motion_s).collect();
-    let first = first_s.iter().copied().reduce(f64::max);
-    Finding {
-        claim: "paper's rooms: no robot computes after the first motion".into(),
-        held: (!runs.is_empty()).then_some(ticks == 0),
-        evidence: format!(
-            "{ticks} ticks over {} runs; the first motion after at most {:.2} s",
-            runs.len(),
-            first.unwrap_or(f64::NAN)
-        ),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use planner::Yardstick;
-
-    use super::super::Best;
-    use super::super::rooms::Room;
-    use super::super::run::Run;
-    use super::*;
-    use crate::paper::run::word;
-
-    /// A room with two robots: makespans of the default method and of the best of the four where
-    /// they solved it, and R.
-    fn room(set: Set, default_s: Option<f64>, best_s: Option<f64>, r_s: Option<f64>) -> Solved {
-        let run = |makespan_s: Option<f64>| Run {
-            outcome: makespan_s.map_or("timeout", |_| word(shm_types::Outcome::Solved)),
-            reason: None,
-            makespan_s: makespan_s.unwrap_or(400.0),
-            first_motion_tick: Some(1),
-            first_motion_s: Some(0.5),
-            computing_after_ticks: 0,
-            planning_before_wall_s: 0.0,
-            planning_wall_s: 0.0,
-            run_wall_s: 0.0,
-        };
-        let room = Room {
-            set,
-            name: "made up".into(),
-            density: None,
-            options: None,
-            robots: 2,
-        };
-        let four = [None, best_s, best_s.map(|best_s| best_s + 9.0), None];
-        let best = r_s.map(|r_s| Best {
-            bound_s: r_s / 2.0,
-            yardstick: Yardstick::Exact {
-                makespan_s: r_s,
-                routes: Vec::new(),
-            },
-        });
-        Solved {
-            room,
-            certified: false,
-            best,
-            runs: Ok([default_s].into_iter().chain(four).map(run).collect()),
-        }
-    }
-
-    fn column(table: &Table, name: &str) -> Vec<String> {
-        let index = table.position(name).unwrap();
-        table
-            .rows
-            .iter()
-            .map(|row| row[index].to_string())
-            .collect()
-    }
-
-    fn finding<'a>(findings: &'a [Finding], claim: &str) -> &'a Finding {
-        let its = |finding: &&Finding| finding.claim.contains(claim);
-        findings.iter().find(its).unwrap()
-    }
-
-    #[test]
-    fn ratios_are_over_the_rooms_that_are_solved_and_the_others_are_counted() {
-        let paper = |default_s, best_s, r_s| room(Set::Paper, default_s, best_s, r_s);
-        let rooms = [
-            paper(Some(11.0), Some(20.0), Some(10.0)),
-            paper(Some(12.0), Some(20.0), Some(10.0)),
-            paper(Some(12.0), Some(20.0), None),
-            paper(None, Some(20.0), Some(10.0)),
-            paper(None, None, None),
-            paper(None, None, None),
-        ];
-        let (tables, findings) = of(&rooms);
-        let table = tables.iter().find(|table| table.name == RATIOS).unwrap();
-        for (name, number) in [
-            ("count", "6"),
-            ("missed", "1"),
-            ("unknown", "2"),
-            ("r_inexact", "1"),
-            ("to_r", "1.15"),
-            ("reached", "yes"),
-        ] {
-            assert_eq!(column(table, name), [number], "{name}");
-        }
-        let found = finding(&findings, "2 robots: mean makespan");
-        assert_eq!(found.held, Some(true), "{}", found.evidence);
-        let mean = mean_ratio(&rooms, &[Set::Paper], 2).unwrap();
-        assert!((mean.value - 1.15).abs() < 1e-12);
-        assert!(mean_ratio(&rooms, &[Set::Paper], 3).is_none());
-    }
-
-    #[test]
-    fn the_figure_of_ratios_names_its_groups_and_the_target() {
-        let rooms = [Set::Paper, Set::Generated]
-            .map(|set| [11.0, 12.0].map(|default_s| room(set, Some(default_s), None, Some(10.0))));
-        let figures = super::super::figures::all(rooms.as_flattened(), &[]).unwrap();
-        let legend = figures[0].legend.iter().map(|(_, name)| name.as_str());
-        let groups = ["paper and seeded rooms", "generated rooms"];
-        assert!(
-            legend.eq(groups
-                .into_iter()
-                .chain(["target in the paper's and seeded rooms"]))
-        );
-    }
-
-    #[test]
-    fn rooms_in_which_another_method_was_faster_are_named_the_worst_first() {
-        let rooms = [
-            (10.0, 20.0),
-            (10.0, 10.0),
-            (30.0, 20.0),
-            (40.0, 20.0),
-            (20.01, 20.0),
-        ]
-        .map(|(own, best)| room(Set::Generated, Some(own), Some(best), None));
-        let (tables, findings) = of(&rooms);
-        let table = tables.iter().find(|table| table.name == SLOWER).unwrap();
-        let excess = column(table, "excess");
-        assert_eq!(
-            (&excess[..2], excess.len()),
-            (&["2", "1.5"].map(String::from)[..], 3)
-        );
-        let found = finding(&findings, "none is faster");
-        assert_eq!(found.held, Some(false));
-        assert!(found.evidence.starts_with("2 of 5"), "{}", found.evidence);
-        assert!(found.evidence.contains("1 of them by a single tick"));
-        assert_eq!(finding(&findings, "never by more than").held, Some(false));
-        assert_eq!(finding(&findings, "are solved").held, Some(true));
-    }
-
-    #[test]
-    fn a_robot_that_computes_after_the_first_motion_is_found() {
-        let held = |ticks| {
-            let mut rooms = [(); 2].map(|()| room(Set::Paper, Some(9.0), None, None));
-            for run in rooms[1].runs.iter_mut().flatten() {
-                run.computing_after_ticks = ticks;
-            }
-            finding(&of(&rooms).1, "no robot computes").held
-        };
-        assert_eq!((held(0), held(3)), (Some(true), Some(false)));
-    }
 }
