@@ -4,12 +4,13 @@
 //! Responsible for: committing a move (approach, grasp, transfer, release, the way home), what that
 //! reserves, taking back a way home that nothing hangs on.
 //! Not responsible for: which move comes next (`order`), searching (`route`), who has to make room
-//! (`room`), laying out plans that are known (`lay`).
+//! (`room`), who grasps later than it could (`late`), laying out plans that are known (`lay`).
 //!
 //! Terms: a robot's *tail* is its way home after its last release. Everybody else plans around
 //! it; when the robot gets another move, its tail is taken back first. Whoever is parked is
 //! reserved for ever until its next committed move, so waiting there is always possible.
 
+pub(super) mod late;
 pub(super) mod lay;
 mod room;
 
@@ -18,13 +19,10 @@ use std::rc::Rc;
 use scene::{Event, ROBOT_ALONE, Scene, Vec2};
 
 use crate::anytime::ground::{EVER, Ground, Time};
-use crate::anytime::rounds::MOST_PATIENCE_S;
 use crate::anytime::route::{Leg, Piece, Quest, Router, Target, Then, sides};
 use crate::anytime::timeline::{Owner, Resting, Timeline};
 use crate::anytime::track::{Deed, Ends, Left, Move, Place, Rest, Start, Track};
 
-/// A robot that would wait for longer at a grasp has not begun it, s.
-pub(super) const LONG_WAIT_S: f64 = 1.0;
 /// No object.
 const NOTHING: Resting = (Owner::MAX, 0);
 
@@ -153,29 +151,6 @@ impl Plan {
         });
         self.way = way;
         done
-    }
-
-    /// Lets a robot that would hold an object for long before it can put it down wait with free
-    /// hands instead, if it is done as soon: what it has not grasped yet can still be planned anew.
-    fn grasp_late(
-        &self,
-        ground: &Ground,
-        router: &mut Router,
-        wanted: &Move,
-        legs: &mut [Leg; 3],
-        end: Time,
-        way: &mut Vec<Piece>,
-    ) {
-        let Some(late) = late_grasp(ground, legs, way) else {
-            return;
-        };
-        legs[0].then = Then::Grasp(late);
-        let mut quest = self.quest(wanted, legs, 0);
-        quest.limit = end.saturating_add(1);
-        let mut later = Vec::new();
-        if (router.find(ground, &self.timeline, &quest, &mut later)).is_some() {
-            *way = later;
-        }
     }
 
     /// The legs of a move that begins where the robot's tail does; its object is put down no
@@ -478,22 +453,4 @@ fn closed_by(places: [Option<&Rc<Place>>; 2]) -> Vec<u32> {
     places
         .flat_map(|place| place.bare.iter().copied())
         .collect()
-}
-
-/// When the grasp of a move may begin at the latest, with the walls alone, if the object would be
-/// held for much longer than it takes to bring it to its place, from when plans still change.
-fn late_grasp(ground: &Ground, legs: &[Leg; 3], way: &[Piece]) -> Option<Time> {
-    let mut grips = way.iter().filter_map(|piece| match piece {
-        Piece::Grip(end) => Some(*end),
-        Piece::Step(..) => None,
-    });
-    let (grasped, released) = (grips.next()?, grips.next()?);
-    if grasped > ground.time(MOST_PATIENCE_S) {
-        return None;
-    }
-    let Target::Place(at, _) = legs[0].target else {
-        return None;
-    };
-    let late = released.checked_sub(legs[1].ahead(at)? + ground.release)?;
-    (late > grasped + ground.time(LONG_WAIT_S)).then(|| late - ground.grasp)
 }

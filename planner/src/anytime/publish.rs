@@ -19,7 +19,8 @@ use shm_types::capacity::MAX_ACTIONS;
 use shm_types::{Action, Grip, NONE, RobotSchedule, Schedule, Wait};
 
 use crate::anytime::ground::{Ground, Time};
-use crate::anytime::plan::{LONG_WAIT_S, Plan};
+use crate::anytime::plan::Plan;
+use crate::anytime::plan::late::LONG_WAIT_S;
 use crate::anytime::publish::needs::{Need, add_user_order, needs_of};
 use crate::anytime::rounds::patience_s;
 use crate::anytime::situation::{RobotAt, Situation};
