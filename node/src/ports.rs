@@ -60,25 +60,52 @@ pub(crate) fn service_name(topic: &'static str) -> Result<ServiceName, TopicErro
     ServiceName::new(&format!("rearrange/{topic}")).map_err(|e| failed("name", topic)(&e))
 }
 
-/// Joins the iceoryx2 domain with this root directory and prefix. The configuration is ours alone:
-/// iceoryx2's global one would be read from the working directory.
+/// Who removes the ports and nodes that dead processes have left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Burial {
+    /// Whoever joins.
+    OfAll,
+    /// Others. What a process has begun to remove that is killed then, nobody removes any more: to
+    /// iceoryx2 it is still at it. Its port would be in the way of the next ones for ever, so
+    /// whoever may be killed at any time leaves that to the supervisor, with which all would go.
+    ByOthers,
+}
+
+/// Joins the iceoryx2 domain with this root directory and prefix.
 ///
 /// # Errors
 /// The domain cannot be used.
-pub(crate) fn join(root: &Path, prefix: &str, name: &str) -> Result<IpcNode, TopicError> {
+pub(crate) fn join(
+    root: &Path,
+    prefix: &str,
+    name: &str,
+    burial: Burial,
+) -> Result<IpcNode, TopicError> {
     let error = failed("join the domain of", "all");
     set_log_level_from_env_or(LogLevel::Error);
+    NodeBuilder::new()
+        .name(&NodeName::new(name).map_err(|e| error(&e))?)
+        .config(&config(root, prefix, burial)?)
+        .signal_handling_mode(SignalHandlingMode::Disabled)
+        .create::<ipc::Service>()
+        .map_err(|e| error(&e))
+}
+
+/// The configuration of the domain is ours alone: iceoryx2's global one would be read from the
+/// working directory.
+fn config(root: &Path, prefix: &str, burial: Burial) -> Result<Config, TopicError> {
+    let error = failed("join the domain of", "all");
     let mut config = Config::default();
     config.global.prefix = FileName::new(prefix.as_bytes()).map_err(|e| error(&e))?;
     let root =
         iceoryx2::prelude::Path::new(root.as_os_str().as_encoded_bytes()).map_err(|e| error(&e))?;
     config.global.set_root_path(&root);
-    NodeBuilder::new()
-        .name(&NodeName::new(name).map_err(|e| error(&e))?)
-        .config(&config)
-        .signal_handling_mode(SignalHandlingMode::Disabled)
-        .create::<ipc::Service>()
-        .map_err(|e| error(&e))
+    if burial == Burial::ByOthers {
+        config.global.node.cleanup_dead_nodes_on_creation = false;
+        config.global.node.cleanup_dead_nodes_on_destruction = false;
+        config.global.service.cleanup_dead_nodes_on_open = false;
+    }
+    Ok(config)
 }
 
 /// Who makes a topic and who only uses it: the supervisor makes all before it starts a role.
@@ -249,5 +276,78 @@ impl<T: Message> Deref for Sample<T> {
 
     fn deref(&self) -> &T {
         &self.0.payload().0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::process::Command;
+
+    use iceoryx2::node::NodeState;
+    use iceoryx2::prelude::CallbackProgression;
+
+    use super::*;
+    use crate::shared_memory;
+
+    /// What tells this test that it is the process that dies: the root of the domain.
+    const ROOT: &str = "REARRANGE_TEST_ROOT";
+    const NAME: &str = "ports::tests::whoever_may_be_killed_leaves_the_dead_to_others";
+
+    fn topic() -> Topic<shm_types::Command> {
+        Topic {
+            name: "test",
+            publishers: 1,
+            subscribers: 1,
+            nodes: 4,
+            history: 0,
+            buffer: 2,
+            borrowed: 2,
+            message: PhantomData,
+        }
+    }
+
+    fn dead(root: &Path, prefix: &str) -> usize {
+        let mut dead = 0;
+        let config = config(root, prefix, Burial::ByOthers).unwrap();
+        IpcNode::list(&config, |state| {
+            dead += usize::from(matches!(state, NodeState::Dead(_)));
+            CallbackProgression::Continue
+        })
+        .unwrap();
+        dead
+    }
+
+    #[test]
+    fn whoever_may_be_killed_leaves_the_dead_to_others() {
+        if let Some(root) = std::env::var_os(ROOT) {
+            let prefix = std::env::var("REARRANGE_TEST_PREFIX").unwrap();
+            let node = join(Path::new(&root), &prefix, "dies", Burial::ByOthers).unwrap();
+            let service = topic().service(&node, Access::Open).unwrap();
+            let _port = service.publisher().unwrap();
+            // Nothing is dropped.
+            std::process::exit(0);
+        }
+        let root = tempfile::Builder::new().prefix("rr").tempdir().unwrap();
+        let prefix = format!("rrp{}_", std::process::id());
+        let supervisor = join(root.path(), &prefix, "supervisor", Burial::OfAll).unwrap();
+        let held = topic().service(&supervisor, Access::Create).unwrap();
+        let status = Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", NAME])
+            .env(ROOT, root.path())
+            .env("REARRANGE_TEST_PREFIX", &prefix)
+            .status();
+        assert!(status.unwrap().success());
+        assert_eq!(dead(root.path(), &prefix), 1);
+        let next = join(root.path(), &prefix, "next", Burial::ByOthers).unwrap();
+        let service = topic().service(&next, Access::Open).unwrap();
+        let refused = service.publisher().map(|_| ()).unwrap_err().to_string();
+        assert!(refused.contains("ExceedsMaxSupported"), "{refused}");
+        assert_eq!(dead(root.path(), &prefix), 1, "they are left alone");
+        supervisor.try_cleanup_dead_nodes();
+        assert_eq!(dead(root.path(), &prefix), 0);
+        drop(service.publisher().unwrap());
+        drop((service, next));
+        drop((held, supervisor));
+        shared_memory::remove_all(&prefix).unwrap();
     }
 }

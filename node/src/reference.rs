@@ -27,7 +27,7 @@ use crate::children::Participant;
 use crate::domain::{NewRun, RunDirectory, RunFile};
 use crate::histograms::Latencies;
 use crate::options::{Launcher, Recovery, Role, RunPlan};
-use crate::ports::{self, Service, TopicError, failed};
+use crate::ports::{self, Burial, Service, TopicError, failed};
 use crate::report::RoleReport;
 use crate::roles::{RoleError, Seat};
 use crate::shared_memory;
@@ -94,7 +94,7 @@ pub fn run(plan: &RunPlan) -> Result<ReferenceReport, RunError> {
         recovery: Recovery::default(),
         silence_limit_s: plan.silence_limit.as_secs_f64(),
     })?;
-    let node = ports::join(&file.root, &file.prefix, "supervisor")?;
+    let node = ports::join(&file.root, &file.prefix, "supervisor", Burial::OfAll)?;
     make_private(&file)?;
     let topics = topics.create(&node)?;
     // As many readers as a run has: its supervisor is one.

@@ -27,7 +27,7 @@ use shm_types::{Checked, ControlKind, ControlRequest, Counts, Outcome, RoleKind,
 
 use crate::domain::{DomainError, NewRun, RunDirectory, RunFile};
 use crate::options::{OptionError, Role, RunOptions, RunPlan};
-use crate::ports::{self, IpcNode, TopicError};
+use crate::ports::{self, Burial, IpcNode, TopicError};
 use crate::report::RunReport;
 use crate::shared_memory::{self, ResourceError};
 use crate::topics::{HeldTopics, Topics};
@@ -237,7 +237,7 @@ impl<'p> Run<'p> {
         diary.note(Happened::Supervised {
             pid: std::process::id(),
         });
-        let node = ports::join(&file.root, &file.prefix, "supervisor")?;
+        let node = ports::join(&file.root, &file.prefix, "supervisor", Burial::OfAll)?;
         make_private(&file)?;
         let janitor = Janitor::start(file.prefix.clone()).map_err(RunError::Signals)?;
         let topics = topics.create(&node)?;

@@ -11,7 +11,7 @@ use shm_types::{ControlKind, ControlRequest, RoleKind};
 
 use crate::domain::{self, DomainError, RunFile};
 use crate::options::{Clock, Role, Told, Wait};
-use crate::ports::{self, Access, TopicError};
+use crate::ports::{self, Access, Burial, TopicError};
 use crate::topics::Topics;
 
 /// How long the world may take to answer.
@@ -67,7 +67,7 @@ pub fn tell(run: &str, told: &Told) -> Result<Answered, TellError> {
     {
         return Err(TellError::Ended(*robot));
     }
-    let node = ports::join(&run.root, &run.prefix, "tell")?;
+    let node = ports::join(&run.root, &run.prefix, "tell", Burial::OfAll)?;
     let options = &run.options;
     let topics = Topics::of(run.room(), options.settings.method, options.monitors);
     let by = Instant::now() + PATIENCE;

@@ -28,7 +28,7 @@ use crate::clock;
 use crate::domain::{DomainError, RunFile};
 use crate::histograms::{Latencies, LatencyFileError, Timed};
 use crate::options::{Clock, Role, RunOptions, Wait};
-use crate::ports::{self, IpcNode, TopicError};
+use crate::ports::{self, Burial, IpcNode, TopicError};
 use crate::realtime;
 use crate::report::RoleReport;
 use crate::topics::Topics;
@@ -129,7 +129,7 @@ impl Seat {
         Ok(Self {
             role,
             incarnation,
-            node: ports::join(&run.root, &run.prefix, &role.to_string())?,
+            node: ports::join(&run.root, &run.prefix, &role.to_string(), Burial::ByOthers)?,
             topics: Topics::of(
                 run.room(),
                 run.options.settings.method,

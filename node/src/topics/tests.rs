@@ -28,7 +28,7 @@ impl Domain {
     }
 
     fn node(&self, name: &str) -> IpcNode {
-        ports::join(self.root.path(), &self.prefix, name).unwrap()
+        ports::join(self.root.path(), &self.prefix, name, ports::Burial::OfAll).unwrap()
     }
 }
 
