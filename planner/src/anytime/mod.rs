@@ -56,7 +56,7 @@ const ATTEMPTS_BEFORE_SEARCH: u64 = 8;
 /// One configuration of the complete search, in work units.
 const UNITS_PER_CONFIGURATION: u64 = 40;
 /// One configuration of the search for a shortest plan, in work units.
-const UNITS_PER_SMALL_CONFIGURATION: u64 = 10;
+const UNITS_PER_SMALL_CONFIGURATION: u64 = 13;
 /// One piece of a way that is reserved again, in work units.
 const UNITS_PER_PIECE: u64 = 4;
 /// One safe interval expanded, in work units.

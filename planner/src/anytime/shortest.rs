@@ -12,17 +12,19 @@
 //! one another closely.
 //! Source: rule 34.
 
+mod closed;
 #[cfg(test)]
 mod tests;
 
 use std::collections::HashMap;
-use std::collections::hash_map::Entry;
 use std::rc::Rc;
 
-use scene::{ClassId, ObjectSpec, ROBOT_ALONE, Scene};
+use foldhash::fast::FixedState;
+use scene::{ROBOT_ALONE, Scene};
 
-use crate::anytime::ground::{Ground, Mask, Time, duration, offsets_of_resting};
+use crate::anytime::ground::{Ground, Time, duration};
 use crate::anytime::joint::JointMove;
+use crate::anytime::shortest::closed::{Closed, MOST_CELLS};
 use crate::anytime::track::{Place, Start};
 
 /// Most configurations that are kept.
@@ -33,6 +35,8 @@ const MOST_GRIP_BY_STEP: f64 = 1.1;
 const NONE: u8 = u8::MAX;
 /// Bytes of a configuration: by robot its cell and what it holds, then by object its cell.
 const BYTES: usize = 16;
+/// As many robots fit into them.
+const MOST_ROBOTS: usize = BYTES / 2;
 
 type Configuration = [u8; BYTES];
 
@@ -55,7 +59,6 @@ pub(crate) enum Least {
 struct Side {
     /// In the order in which they were seen, each with the number of the one before it.
     list: Vec<(Configuration, u32)>,
-    known: HashMap<Configuration, u32>,
     /// The next to look at, and the end of its level.
     next: usize,
     end: usize,
@@ -68,12 +71,14 @@ pub(crate) struct Shortest {
     objects: usize,
     /// Plans have to have fewer steps.
     limit: u32,
-    /// By class, then object: offsets from the resting object.
-    resting: Vec<Vec<Mask>>,
-    pass_under: Vec<bool>,
+    closed: Closed,
     sides: [Side; 2],
     /// Which side is being gone on with.
     side: usize,
+    /// Twice the number in the list of its side, and one more if that is the second.
+    known: HashMap<Configuration, u32, FixedState>,
+    /// By robot: directions in which it can step, if no other robot is in the way.
+    steps: [u8; MOST_ROBOTS],
     found: Vec<Configuration>,
 }
 
@@ -101,7 +106,7 @@ impl Shortest {
             scene.is_plain(object) && (passes || !scene.lifts_from_below(object))
         };
         let is_plain = scene.before.is_empty() && (0..objects).all(is_plain);
-        let fits = ground.points() < usize::from(NONE) && 2 * robots + objects <= BYTES;
+        let fits = ground.points() <= MOST_CELLS && 2 * robots + objects <= BYTES;
         if !(in_steps && exact && is_plain && fits) {
             return None;
         }
@@ -122,23 +127,16 @@ impl Shortest {
             ends[0][2 * robots + object] = place.grasp as u8;
             ends[1][2 * robots + object] = goal.grasp as u8;
         }
-        let body = |class: usize| scene.body(ClassId(class));
-        let resting = (0..ground.classes).map(|kept| {
-            let of = |object: &ObjectSpec| {
-                let pitch_m = scene.lattice.pitch_m;
-                let there = body(object.class.0);
-                Mask::of(offsets_of_resting(body(kept), there, pitch_m))
-            };
-            scene.objects.iter().map(of).collect()
-        });
+        let seen = [(ends[0], 0), (ends[1], 1)];
         Some(Self {
             robots,
             objects,
             limit: known / duration(0),
-            resting: resting.collect(),
-            pass_under: scene.objects.iter().map(|spec| spec.pass_under).collect(),
+            closed: Closed::new(scene, ground),
             sides: ends.map(Side::new),
             side: 0,
+            known: seen.into_iter().collect(),
+            steps: [0; MOST_ROBOTS],
             found: Vec::new(),
         })
     }
@@ -159,14 +157,16 @@ impl Shortest {
             let index = side.next;
             side.next += 1;
             let at = side.list[index].0;
-            self.found.clear();
-            self.choose(ground, &at, &at, 0);
+            self.look_around(ground, &at);
             let found = std::mem::take(&mut self.found);
             for then in &found {
-                if self.sides[1 - self.side].known.contains_key(then) {
-                    return Least::Plan(self.trace(ground, index, then));
+                let number = (2 * self.sides[self.side].list.len() + self.side) as u32;
+                let seen = *self.known.entry(*then).or_insert(number);
+                if seen == number {
+                    self.sides[self.side].list.push((*then, index as u32));
+                } else if seen as usize % 2 != self.side {
+                    return Least::Plan(self.trace(ground, index, seen / 2));
                 }
-                self.sides[self.side].offer(*then, index as u32);
             }
             self.found = found;
             if self.seen() > MOST_CONFIGURATIONS {
@@ -189,6 +189,22 @@ impl Shortest {
         side.next < side.end && depth + 1 < self.limit
     }
 
+    /// Finds all that robots can do in one step.
+    fn look_around(&mut self, ground: &Ground, at: &Configuration) {
+        for robot in 0..self.robots {
+            let (cell, class) = (at[2 * robot], class_of(ground, at[2 * robot + 1]));
+            let closed = self.closed.by_objects(class, self.places(at));
+            let is_open = |direction: &usize| !closed.has(next_to(ground, cell, *direction));
+            let steps = ground.walls(class).steps(u32::from(cell));
+            self.steps[robot] = (0..4)
+                .filter(|direction| steps >> direction & 1 == 1)
+                .filter(is_open)
+                .fold(0, |open, direction| open | 1 << direction);
+        }
+        self.found.clear();
+        self.choose(ground, at, at, 0);
+    }
+
     /// Finds what `robot` and those after it can do; `then` is what those before it have done.
     fn choose(&mut self, ground: &Ground, at: &Configuration, then: &Configuration, robot: usize) {
         if robot == self.robots {
@@ -196,59 +212,42 @@ impl Shortest {
             return;
         }
         let (cell, held) = (at[2 * robot], at[2 * robot + 1]);
-        let class = class_of(ground, held);
         let go_on = |this: &mut Self, next: &Configuration| {
             if (0..robot).all(|other| this.are_clear(ground, at, next, robot, other)) {
                 this.choose(ground, at, next, robot + 1);
             }
         };
         go_on(self, then);
-        let steps = ground.walls(class).steps(u32::from(cell));
+        let steps = self.steps[robot];
         for direction in (0..4).filter(|direction| steps >> direction & 1 == 1) {
-            let to = u32::from(cell).wrapping_add_signed(ground.offsets[direction]);
-            if self.is_clear_of_objects(ground, at, class, to) {
-                let mut next = *then;
-                next[2 * robot] = to as u8;
-                go_on(self, &next);
-            }
+            let mut next = *then;
+            next[2 * robot] = next_to(ground, cell, direction);
+            go_on(self, &next);
         }
         let objects = 2 * self.robots;
+        let mut next = *then;
         if held == NONE {
-            let there = at[objects..objects + self.objects].iter();
-            let Some(object) = there.clone().position(|&there| there == cell) else {
+            let Some(object) = self.places(at).iter().position(|&place| place == cell) else {
                 return;
             };
-            let mut next = *then;
             next[2 * robot + 1] = object as u8;
             next[objects + object] = NONE;
             let carrying = ground.carrying(object, 0);
             if ground.walls(carrying).is_free(u32::from(cell))
-                && self.is_clear_of_objects(ground, &next, carrying, u32::from(cell))
+                && !(self.closed.by_objects(carrying, self.places(&next))).has(cell)
             {
                 go_on(self, &next);
             }
         } else {
-            let mut next = *then;
             next[2 * robot + 1] = NONE;
             next[objects + usize::from(held)] = cell;
             go_on(self, &next);
         }
     }
 
-    /// Whether a body at a cell meets no object at rest.
-    fn is_clear_of_objects(
-        &self,
-        ground: &Ground,
-        at: &Configuration,
-        class: usize,
-        cell: u32,
-    ) -> bool {
-        (0..self.objects).all(|object| {
-            let place = at[2 * self.robots + object];
-            place == NONE
-                || class == ROBOT_ALONE.0 && self.pass_under[object]
-                || !self.resting[class][object].has(ground.offset(cell, u32::from(place)))
-        })
+    /// Where objects are.
+    fn places<'a>(&self, at: &'a Configuration) -> &'a [u8] {
+        &at[2 * self.robots..][..self.objects]
     }
 
     /// Whether two robots are clear of each other from one configuration to the next.
@@ -260,27 +259,29 @@ impl Shortest {
         robot: usize,
         other: usize,
     ) -> bool {
-        let ends = |robot: usize| [at, then].map(|at| u32::from(at[2 * robot]));
+        let ends = |robot: usize| [at, then].map(|at| at[2 * robot]);
         // Who grips counts as carrying all the while.
         let class = |robot: usize| {
             let held = at[2 * robot + 1].min(then[2 * robot + 1]);
             class_of(ground, held)
         };
         let (mine, others) = (ends(robot), ends(other));
-        let meet = |a: u32, b: u32| ground.meet(class(robot), a, class(other), b);
-        let way = |[from, to]: [u32; 2]| ground.offset(to, from);
+        let closed = |cell: u8| self.closed.by_robot(class(robot), class(other), cell);
+        let way = |[from, to]: [u8; 2]| i16::from(to) - i16::from(from);
         if way(mine) == way(others) {
-            return !meet(mine[1], others[1]);
+            return !closed(others[1]).has(mine[1]);
         }
-        !mine.iter().any(|&a| others.iter().any(|&b| meet(a, b)))
+        !others
+            .iter()
+            .any(|&cell| mine.iter().any(|&at| closed(cell).has(at)))
     }
 
-    /// The plan that goes through a configuration and the next one, which the other side knows.
-    fn trace(&self, ground: &Ground, index: usize, then: &Configuration) -> Vec<JointStep> {
+    /// The plan that goes through a configuration and the next one, which is one of the other side.
+    fn trace(&self, ground: &Ground, index: usize, then: u32) -> Vec<JointStep> {
         let (near, far) = (&self.sides[self.side], &self.sides[1 - self.side]);
         let mut path = near.back_from(index as u32);
         path.reverse();
-        path.extend(far.back_from(far.known[then]));
+        path.extend(far.back_from(then));
         if self.side == 1 {
             path.reverse();
         }
@@ -320,22 +321,18 @@ fn class_of(ground: &Ground, held: u8) -> usize {
     }
 }
 
+/// The cell next to another one.
+fn next_to(ground: &Ground, cell: u8, direction: usize) -> u8 {
+    u32::from(cell).wrapping_add_signed(ground.offsets[direction]) as u8
+}
+
 impl Side {
     fn new(end: Configuration) -> Self {
         Self {
             list: vec![(end, u32::MAX)],
-            known: HashMap::from([(end, 0)]),
             next: 0,
             end: 0,
             depth: 0,
-        }
-    }
-
-    fn offer(&mut self, then: Configuration, from: u32) {
-        let index = self.list.len() as u32;
-        if let Entry::Vacant(vacant) = self.known.entry(then) {
-            vacant.insert(index);
-            self.list.push((then, from));
         }
     }
 
