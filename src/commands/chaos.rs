@@ -13,12 +13,13 @@ mod victim;
 use std::time::Duration;
 
 use crate::cli::ChaosArgs;
+use crate::drivers::interrupt::Interrupt;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::{output, scenario};
 use plan::Plan;
 use report::Report;
 use set_ups::SetUps;
-use victim::Victim;
+use victim::{Ended, Victim};
 
 /// A run without any sign of life for so long is wedged.
 const WEDGED: Duration = Duration::from_secs(30);
@@ -32,18 +33,24 @@ pub(crate) fn main(args: &ChaosArgs) -> Outcome {
     let mut plan = Plan::new(args);
     let mut report = Report::new(args, scene.homes.len());
     let mut set_ups = SetUps::default();
+    let interrupt = Interrupt::watch()
+        .map_err(|error| Failure::system(format!("signals cannot be watched: {error}")))?;
     while plan.is_open() && report.failures.len() < MOST_FAILED {
-        let number = report.runs;
-        report.runs += 1;
-        let victim = Victim::start(args, number, &mut set_ups);
+        let victim = Victim::start(args, report.runs, &mut set_ups);
         let mut victim = victim
             .map_err(|error| Failure::system(format!("a run could not be started: {error}")))?;
-        let ended = victim.torment(&mut plan, WEDGED);
+        let ended = victim.torment(&mut plan, WEDGED, &interrupt);
+        if ended == Ended::BrokenOff {
+            // What was done to it tells nothing.
+            victim.clean_up();
+            break;
+        }
         report.take(victim, ended, &mut plan);
         if output::is_watched() {
             output::complain(&report.progress(&plan));
         }
     }
+    report.interrupted = interrupt.is_asked();
     report.leftovers = node::domain::leftovers().map_or(0, |found| found.len());
     if args.json {
         output::print_json(&report.json())?;
@@ -54,6 +61,8 @@ pub(crate) fn main(args: &ChaosArgs) -> Outcome {
         Exit::Success
     } else if report.violations > 0 {
         Exit::Invariant
+    } else if report.interrupted && report.failures.is_empty() {
+        Exit::Interrupted
     } else {
         Exit::System
     })

@@ -1,4 +1,4 @@
-//! Ctrl-C and SIGTERM while everything runs in this process.
+//! Ctrl-C and SIGTERM for work that looks now and then whether it is to stop.
 //!
 //! Responsible for: turning the first signal into a flag; the second one ends the program at once.
 //! Not responsible for: runs with processes, whose supervisor catches signals itself.

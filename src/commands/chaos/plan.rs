@@ -17,6 +17,9 @@ use crate::cli::{ChaosArgs, Phase, Target};
 const ONE_STALL_IN: u32 = 8;
 const ONE_SET_IN: u32 = 25;
 
+/// A blow that came too late falls after this share of its wait the next time.
+const SOONER: f64 = 0.8;
+
 /// What is done to a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -85,6 +88,12 @@ impl Plan {
         if let Some(queue) = self.queue(phase, target) {
             queue.push_front(blow);
         }
+    }
+
+    /// A blow that came too late, after the set-up in which it was to fall.
+    pub(crate) fn bring_forward(&mut self, phase: Phase, target: Target, mut blow: Blow) {
+        blow.at *= SOONER;
+        self.give_back(phase, target, blow);
     }
 
     /// Whether any is left.

@@ -43,6 +43,8 @@ pub(crate) struct Report {
     erred: Vec<String>,
     pub(crate) violations: u64,
     pub(crate) leftovers: usize,
+    /// Whether it was broken off, with the last run.
+    pub(crate) interrupted: bool,
     /// Runs that did not end as they should, in words.
     pub(crate) failures: Vec<String>,
 }
@@ -67,12 +69,14 @@ impl Report {
             erred: Vec::new(),
             violations: 0,
             leftovers: 0,
+            interrupted: false,
             failures: Vec::new(),
         }
     }
 
     /// Takes in a run that is over.
     pub(crate) fn take(&mut self, mut victim: Victim, ended: Ended, plan: &mut Plan) {
+        self.runs += 1;
         victim.discount(plan);
         for dealt in &victim.dealt {
             let key = (dealt.phase, dealt.target);
@@ -110,6 +114,7 @@ impl Report {
     fn judge(&mut self, victim: &Victim, ended: &Ended, result: Option<&Value>) -> Option<String> {
         let status = match ended {
             Ended::Wedged => return Some(format!("wedged; {}", victim.last_words())),
+            Ended::BrokenOff => return Some("broken off".to_owned()),
             Ended::With(status) => status,
         };
         let Some(result) = result else {
@@ -187,6 +192,7 @@ impl Report {
             "violations": self.violations,
             "leftovers": self.leftovers,
             "failures": self.failures,
+            "interrupted": self.interrupted,
             "wall_s": self.began.elapsed().as_secs_f64(),
             "machine": bench::machine::Machine::current(),
             "date": bench::machine::date_utc(),
@@ -195,6 +201,9 @@ impl Report {
 
     pub(crate) fn text(&self) -> String {
         let mut text = String::new();
+        if self.interrupted {
+            text.push_str("Interrupted: this is what came of the runs that were over.\n");
+        }
         let kills: u64 = self.kills.values().sum();
         let stalls: u64 = self.stalls.values().sum();
         let _ = writeln!(

@@ -26,6 +26,7 @@ use serde_json::Value;
 use crate::cli::{ChaosArgs, ChaosClock, Phase, Target};
 use crate::commands::chaos::plan::{Blow, How, Plan};
 use crate::commands::chaos::set_ups::SetUps;
+use crate::drivers::interrupt::Interrupt;
 
 /// Sleep between two looks.
 const PERIOD: Duration = Duration::from_micros(500);
@@ -37,6 +38,8 @@ const STALL_MS: f64 = 120.0;
 const PER_SET_UP: usize = 24;
 /// Blows after which a run is left in peace until its end.
 const PER_RUN: usize = 100;
+/// Longest that a run may take to stop.
+const STOPPING: Duration = Duration::from_secs(10);
 /// A blow this close to the end of the last task may have come after it, ns.
 const MARGIN_NS: u64 = 5_000_000;
 
@@ -75,12 +78,14 @@ struct Armed {
 }
 
 /// How a tormented run ended.
-#[derive(Debug)]
+#[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Ended {
     /// By itself.
     With(ExitStatus),
     /// It showed no sign of life any more, and was put down.
     Wedged,
+    /// It was stopped since somebody has asked for it.
+    BrokenOff,
 }
 
 /// The run.
@@ -175,8 +180,18 @@ impl<'a> Victim<'a> {
     }
 
     /// Strikes until the run is over.
-    pub(crate) fn torment(&mut self, plan: &mut Plan, wedged: Duration) -> Ended {
+    pub(crate) fn torment(
+        &mut self,
+        plan: &mut Plan,
+        wedged: Duration,
+        interrupt: &Interrupt,
+    ) -> Ended {
         loop {
+            if interrupt.is_asked() {
+                self.disarm(plan);
+                self.stop();
+                return Ended::BrokenOff;
+            }
             self.read();
             if let Ok(Some(status)) = self.supervisor.try_wait() {
                 self.read();
@@ -431,18 +446,21 @@ impl<'a> Victim<'a> {
             (std::mem::take(&mut self.armed).into_iter()).partition(|armed| armed.at_ns <= now_ns);
         self.armed = waiting;
         for armed in due {
-            let is_still_so = match (armed.role, armed.phase) {
-                (None, Phase::Setup) => !self.is_steady() && armed.pid == self.supervisor.id(),
-                (None, Phase::Steady) => armed.pid == self.supervisor.id(),
-                (Some(role), phase) => self.processes.get(&role).is_some_and(|one| {
-                    one.pid == armed.pid && !one.dead && one.ready == (phase == Phase::Steady)
-                }),
+            let is_ready = match armed.role {
+                None => (armed.pid == self.supervisor.id()).then(|| self.is_steady()),
+                Some(role) => (self.processes.get(&role))
+                    .filter(|one| one.pid == armed.pid && !one.dead)
+                    .map(|one| one.ready),
             };
-            if !is_still_so || self.done_ns.is_some() {
-                plan.give_back(armed.phase, armed.target, armed.blow);
-                continue;
+            let (phase, target, blow) = (armed.phase, armed.target, armed.blow);
+            match (is_ready, phase) {
+                _ if self.done_ns.is_some() => plan.give_back(phase, target, blow),
+                (Some(false), Phase::Setup) | (Some(true), Phase::Steady) => {
+                    self.deal(&armed, plan)
+                }
+                (Some(true), Phase::Setup) => plan.bring_forward(phase, target, blow),
+                _ => plan.give_back(phase, target, blow),
             }
-            self.deal(&armed, plan);
         }
     }
 
@@ -520,6 +538,15 @@ impl<'a> Victim<'a> {
         }
         for (pid, _) in self.stalled.drain(..) {
             signal(pid, Signal::CONT);
+        }
+    }
+
+    /// Has it stop by itself, as long as it does so soon.
+    fn stop(&mut self) {
+        signal(self.supervisor.id(), Signal::TERM);
+        let asked = Instant::now();
+        while asked.elapsed() < STOPPING && matches!(self.supervisor.try_wait(), Ok(None)) {
+            std::thread::sleep(PERIOD);
         }
     }
 

@@ -72,3 +72,31 @@ fn a_set_up_that_lasts_otherwise_changes_what_is_usual_by_an_eighth_of_the_diffe
     assert_eq!(set_ups.usual_ns(Target::Robots), 40 * MS);
     assert_eq!(set_ups.usual_ns(Target::Supervisor), 160 * MS);
 }
+
+/// Otherwise it would come too late in every run after that, too.
+#[test]
+fn a_blow_that_came_after_the_set_up_falls_sooner_the_next_time() {
+    let (mut set_ups, mut plan) = (SetUps::default(), plan());
+    let mut run = victim(&mut set_ups);
+    let role = Role::World;
+    let entry = |at_ns, happened| Entry { at_ns, happened };
+    let mut waits = (1..=3).map(|pid| {
+        let started = Happened::Started {
+            role,
+            incarnation: pid,
+            pid,
+        };
+        run.note(entry(1, started));
+        run.arm(&mut plan);
+        let at = run.armed[0].blow.at;
+        run.note(entry(2, Happened::Ready { role, pid }));
+        run.strike(&mut plan);
+        assert!(run.armed.is_empty() && run.dealt.is_empty());
+        at
+    });
+    let (first, second, third) = (waits.next(), waits.next(), waits.next());
+    assert!(
+        second < first && third < second,
+        "{first:?} {second:?} {third:?}"
+    );
+}
