@@ -40,7 +40,7 @@ pub(crate) const JOURNAL_FILE: &str = "journal";
 /// The newest schedule, likewise.
 const SCHEDULE_FILE: &str = "schedule";
 /// The trace, in the run's directory, where no other place was asked for.
-pub(crate) const TRACE_FILE: &str = "trace.mcap";
+pub const TRACE_FILE: &str = "trace.mcap";
 
 /// Why a role gave up.
 #[derive(Debug, thiserror::Error)]

@@ -19,6 +19,7 @@ use std::time::{Duration, Instant};
 
 use node::Role;
 use node::domain::{self, LATEST};
+use node::roles::TRACE_FILE;
 use node::supervisor::{DIARY_FILE, Entry, Happened};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
@@ -113,6 +114,8 @@ pub(crate) struct Victim<'a> {
     /// Processes that ended by themselves, with their words.
     pub(crate) erred: Vec<String>,
     alive: Instant,
+    /// Bytes of its trace, as last seen.
+    traced: u64,
     scenario: Vec<String>,
 }
 
@@ -173,6 +176,7 @@ impl<'a> Victim<'a> {
             cleared: 0,
             erred: Vec::new(),
             alive: Instant::now(),
+            traced: 0,
             scenario,
         };
         victim.supervised_ns = node::monotonic_ns();
@@ -259,9 +263,16 @@ impl<'a> Victim<'a> {
         self.directory = Some(directory);
     }
 
-    /// Reads the diary on.
+    /// Reads the diary on, and sees whether the run shows signs of life.
     fn read(&mut self) {
         self.find_directory();
+        // Between two tasks, which may be long on a busy machine, only the trace grows.
+        let trace = self.directory.as_ref().map(|run| run.join(TRACE_FILE));
+        let traced = trace.and_then(|trace| fs::metadata(trace).ok());
+        let traced = traced.map_or(0, |trace| trace.len());
+        if traced != self.traced {
+            (self.traced, self.alive) = (traced, Instant::now());
+        }
         let Some(diary) = &mut self.diary else {
             return;
         };

@@ -100,3 +100,23 @@ fn a_blow_that_came_after_the_set_up_falls_sooner_the_next_time() {
         "{first:?} {second:?} {third:?}"
     );
 }
+
+#[test]
+fn a_run_whose_trace_grows_is_not_wedged_though_its_diary_says_nothing() {
+    let mut set_ups = SetUps::default();
+    let mut run = victim(&mut set_ups);
+    let directory = tempfile::tempdir().unwrap();
+    run.directory = Some(directory.path().to_owned());
+    let mut is_alive_after = |change: &dyn Fn()| {
+        let before = run.alive;
+        change();
+        run.read();
+        run.alive > before
+    };
+    let trace = directory.path().join(TRACE_FILE);
+    assert!(is_alive_after(&|| fs::write(&trace, "one").unwrap()));
+    assert!(!is_alive_after(&|| ()));
+    assert!(is_alive_after(
+        &|| fs::write(&trace, "one and more").unwrap()
+    ));
+}
