@@ -18,12 +18,20 @@ const FEW: usize = 16;
 /// Least size of a cell of objects, m.
 const LEAST_OBJECT_CELL_M: f64 = 0.1;
 
+/// A box that meets no other.
+const NOWHERE: Aabb = Aabb {
+    min: Vec2::new(f64::INFINITY, f64::INFINITY),
+    max: Vec2::new(f64::NEG_INFINITY, f64::NEG_INFINITY),
+};
+
 /// The grounded objects, by place.
 #[derive(Clone, Debug)]
 pub(crate) struct Ground {
     near: Near,
     /// Boxes of the objects around their centres.
     boxes: Vec<Aabb>,
+    /// Their boxes where they lie; [`NOWHERE`] for those that do not.
+    here: Vec<Aabb>,
     /// How far any object reaches from its centre.
     reach: Aabb,
     put_downs: u64,
@@ -39,6 +47,7 @@ impl Ground {
         let cell_m = (reach.max - reach.min).max().max(LEAST_OBJECT_CELL_M);
         let mut ground = Self {
             near: Near::new(scene, boxes.len(), cell_m),
+            here: vec![NOWHERE; boxes.len()],
             boxes,
             reach,
             put_downs: 0,
@@ -55,6 +64,7 @@ impl Ground {
     /// Puts `object`, which is not on the ground, down at `at`.
     pub(crate) fn put(&mut self, object: usize, at: Vec2) {
         self.near.put(object, at);
+        self.here[object] = self.boxes[object].at(at);
         self.touched.touch(object);
         self.put_downs += 1;
     }
@@ -72,6 +82,7 @@ impl Ground {
     /// Takes `object` off the ground.
     pub(crate) fn take(&mut self, object: usize) {
         self.near.take(object);
+        self.here[object] = NOWHERE;
         self.touched.touch(object);
     }
 
@@ -91,16 +102,16 @@ impl Ground {
         region: Aabb,
         mut hit: impl FnMut(usize, Vec2) -> bool,
     ) -> Option<usize> {
-        let mut is_met =
-            |object: usize, at| self.boxes[object].at(at).meets(&region) && hit(object, at);
-        if self.boxes.len() <= FEW {
-            let is_here = |&o: &usize| self.near.place(o).is_some_and(|at| is_met(o, at));
-            return (0..self.boxes.len()).find(is_here);
+        if self.here.len() <= FEW {
+            let mut is_hit = |o: usize| self.near.place(o).is_some_and(|at| hit(o, at));
+            let is_met = |(o, here): (usize, &Aabb)| here.meets(&region) && is_hit(o);
+            return self.here.iter().enumerate().position(is_met);
         }
         let wide = Aabb {
             min: region.min - self.reach.max,
             max: region.max - self.reach.min,
         };
+        let is_met = |object: usize, at| self.here[object].meets(&region) && hit(object, at);
         self.near.find(wide, is_met)
     }
 }

@@ -14,7 +14,7 @@
 mod tests;
 mod violation;
 
-use scene::{Scene, Vec2};
+use scene::{ClassId, Scene, Vec2};
 use shm_types::TaskStatus;
 
 use crate::bodies::Sweep;
@@ -40,8 +40,8 @@ impl World {
             }
             let has_changed = cleared.change().is_some();
             changed += u64::from(has_changed);
-            if found.is_none() {
-                found = self.check_motion(i, !has_changed);
+            if found.is_none() && !has_moved_well(robot, !has_changed, self.tick_m) {
+                found = Some(Violation::Motion { robot: id(i) });
             }
             if let Some(object) = robot.hand.holding() {
                 holding += 1;
@@ -92,18 +92,6 @@ impl World {
         checks.add(Invariant::Lost, objects, 0);
         checks.add(Invariant::Motion, robots, robots);
         checks.add(Invariant::Grants, pairs, changed_pairs);
-    }
-
-    /// A robot that `followed` its way has gone along it to where what is left of it begins, and
-    /// has no other path granted: there is nothing to measure.
-    fn check_motion(&self, i: usize, followed: bool) -> Option<Violation> {
-        let robot = &self.robots[i];
-        let moved_m = robot.track.moved_m();
-        let used_m = || robot.granted_m - robot.grant.length_from(robot.position);
-        let on_grant = !robot.moved || followed || (used_m() - moved_m).abs() <= 8.0 * ARRIVAL_M;
-        let on_track = is_same(robot.position, robot.track.end());
-        let in_time = moved_m <= self.tick_m + ARRIVAL_M;
-        (!on_grant || !on_track || !in_time).then_some(Violation::Motion { robot: id(i) })
     }
 
     /// Robot `i` and the `object` that it holds.
@@ -171,8 +159,8 @@ impl World {
     /// stands, the new ones from `start`: from there on its motion is looked at tick by tick.
     fn clear_ahead(&self, scene: &Scene, i: usize, start: Vec2, change: Change) -> usize {
         let robot = &self.robots[i];
-        let ahead = robot.grant.points().len() - change.new_from;
-        let pieces = pieces_from(scene, robot, start, change.new_from).take(ahead);
+        let ahead = &robot.grant.points()[change.new_from..];
+        let pieces = pieces(robot.class(scene), start, ahead);
         let clear = pieces.take_while(|piece| self.obstacle(scene, i, *piece).is_none());
         change.new_from + clear.count()
     }
@@ -194,8 +182,8 @@ impl World {
             let points = robot.grant.points()[change.new_from..].iter();
             (self.bodies).region_along(class, change.start, points.copied())
         };
-        for (j, other) in self.robots.iter().enumerate() {
-            if j == i || !region.meets(&cleared[j].region()) {
+        for (j, (other, theirs)) in self.robots.iter().zip(cleared).enumerate() {
+            if j == i || !region.meets(&theirs.region()) {
                 continue;
             }
             let (first, second) = (id(i.min(j)), id(i.max(j)));
@@ -226,7 +214,9 @@ impl World {
             return false;
         }
         let (at, path) = ((other.class(scene), other.position), other.grant.points());
-        pieces_from(scene, robot, change.start, change.new_from)
+        let (stand, ahead) = ([change.start], &robot.grant.points()[change.new_from..]);
+        let ends = if ahead.is_empty() { &stand } else { ahead };
+        pieces(robot.class(scene), change.start, ends)
             .any(|piece| self.bodies.meets_path(scene, piece, false, at, path))
     }
 
@@ -269,19 +259,24 @@ impl World {
     }
 }
 
-/// The straight pieces of a robot's grant from `start` on, but the first `passed`; standing there
-/// if that are all.
-fn pieces_from<'a>(
-    scene: &'a Scene,
-    robot: &'a Robot,
-    start: Vec2,
-    passed: usize,
-) -> impl Iterator<Item = Sweep> + 'a {
-    let class = robot.class(scene);
-    let ends = &robot.grant.points()[passed..];
-    let starts = std::iter::once(start).chain(ends.iter().copied());
-    let stand: Option<Vec2> = ends.is_empty().then_some(start);
-    starts
-        .zip(ends.iter().copied().chain(stand))
-        .map(move |(from, to)| Sweep { class, from, to })
+/// Whether a robot has moved on its grant and no faster than it can. One that `followed` its way
+/// has gone along it to where what is left of it begins, and has no other path granted: there is
+/// nothing to measure.
+#[inline]
+fn has_moved_well(robot: &Robot, followed: bool, tick_m: f64) -> bool {
+    let moved_m = robot.track.moved_m();
+    let used_m = || robot.granted_m - robot.grant.length_from(robot.position);
+    let on_grant = !robot.moved || followed || (used_m() - moved_m).abs() <= 8.0 * ARRIVAL_M;
+    let on_track = is_same(robot.position, robot.track.end());
+    on_grant && on_track && moved_m <= tick_m + ARRIVAL_M
+}
+
+/// The straight pieces from `start` to point after point of `ends`.
+fn pieces(class: ClassId, start: Vec2, ends: &[Vec2]) -> impl Iterator<Item = Sweep> + '_ {
+    let mut from = start;
+    ends.iter().map(move |&to| {
+        let piece = Sweep { class, from, to };
+        from = to;
+        piece
+    })
 }
