@@ -77,8 +77,9 @@ fn a_live_run_is_told_and_what_cannot_be_changes_nothing() {
             ),
             ("goal 0 3.1 2", "the goal lies in wall 1"),
             (
+                // By then a robot may stand there, too.
                 "add-object 5.2 2.9",
-                "object 2 cannot stand there: object 1 stands there",
+                "object 2 cannot stand there: ",
             ),
             ("close 5 1 6 2", "objects[0].goal: the goal lies in wall 3"),
             ("open 1 1", "0 walls cover the point 1, 1"),

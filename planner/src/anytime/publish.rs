@@ -339,7 +339,7 @@ fn join(
     let home = scene.homes[robot];
     let is_still = track.deeds.is_empty();
     let stays = is_still && (track.is_gone || (track.from - home).norm() <= CONTACT_M);
-    if !stays && cell == plan.home(robot) {
+    if !stays && !track.is_cut_off && cell == plan.home(robot) {
         if is_still && !is_at(scene, cell, track.from) {
             joined.begin(0, point(scene.lattice.at(cell)));
         }

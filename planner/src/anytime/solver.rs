@@ -152,16 +152,8 @@ impl Solver {
         if situation.needs_margins {
             ground.leave_margins();
         }
-        let start = Start::new(scene, &ground, situation)?;
-        let homes: Option<Vec<u32>> = (scene.homes.iter().zip(&start.robots))
-            .map(|(&home, track)| {
-                if track.is_gone {
-                    return Some(track.start);
-                }
-                ground.entry(scene, &[ROBOT_ALONE.0], home, &[])
-            })
-            .collect();
-        let homes = homes?;
+        let mut start = Start::new(scene, &ground, situation)?;
+        let homes = homes(scene, &mut ground, &mut start, situation.is_short())?;
         let goals: Vec<Option<Rc<Place>>> = (scene.objects.iter().zip(&situation.objects))
             .enumerate()
             .map(|(object, (spec, state))| {
@@ -436,4 +428,28 @@ impl Solver {
         self.followed.get_or_insert_with(|| best.clone());
         Some(best.makespan)
     }
+}
+
+/// The lattice points of homes; none if some home cannot be joined to the lattice. If some robot is
+/// gone, others may have no way home: they end where they begin.
+fn homes(
+    scene: &Scene,
+    ground: &mut Ground,
+    start: &mut Start,
+    is_short: bool,
+) -> Option<Vec<u32>> {
+    let alone = ROBOT_ALONE.0;
+    let tracks = start.robots.iter_mut().zip(&scene.homes);
+    let homes = tracks.map(|(track, &home)| {
+        if track.is_gone {
+            return Some(track.start);
+        }
+        let home = ground.entry(scene, &[alone], home, &[]);
+        let free = track.free.0;
+        let is_open = |home: &u32| !is_short || ground.field(alone, *home).time(free).is_some();
+        let home = home.filter(is_open);
+        track.is_cut_off = is_short && home.is_none();
+        home.or_else(|| track.is_cut_off.then_some(free))
+    });
+    homes.collect()
 }

@@ -51,6 +51,8 @@ pub(crate) struct Track {
     pub(crate) from: Vec2,
     /// It takes no part: it is an obstacle.
     pub(crate) is_gone: bool,
+    /// It has no way home past those that are gone: it ends where it begins.
+    pub(crate) is_cut_off: bool,
     pub(crate) deeds: Vec<Deed>,
     /// Where the object stands at each grip.
     pub(crate) stops: Vec<Rc<Place>>,
@@ -227,6 +229,7 @@ impl Track {
             start: cell,
             from,
             is_gone: false,
+            is_cut_off: false,
             deeds: Vec::new(),
             stops: Vec::new(),
             kept: 0,
@@ -253,6 +256,7 @@ impl Track {
             start: self.start,
             from: self.from,
             is_gone: self.is_gone,
+            is_cut_off: self.is_cut_off,
             deeds,
             stops: self.stops[..grips].to_vec(),
             kept,

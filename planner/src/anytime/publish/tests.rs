@@ -7,7 +7,8 @@ use shm_types::{Point, zeroed};
 use super::*;
 use crate::anytime::keep::kept;
 use crate::anytime::solver::Solver;
-use crate::anytime::solver::testing::{planned_for, written};
+use crate::anytime::solver::testing::{cells, planned_for, written};
+use crate::anytime::track::grips_in_turn;
 
 fn ends_at_home(scene: &Scene, script: &Script) {
     for (part, home) in script.robots.iter().zip(&scene.homes) {
@@ -161,4 +162,25 @@ fn nobody_grasps_long_before_it_can_put_down_while_that_can_still_change() {
     let keeps = |(action, _): &(Action, Vec<Wait>)| action.grip == Grip::Keep.code();
     assert!(listed.iter().all(keeps), "{listed:?}");
     assert!(kept(&script, tracks, until)[1] < tracks[1].deeds.len());
+}
+
+/// The robot that is gone stands between the other one and its home.
+#[test]
+fn who_has_no_way_home_past_one_that_is_gone_brings_what_it_can_and_goes_back_to_where_it_was() {
+    let scene = cells(&["A.Ba1."]);
+    let mut situation = Situation::at_start(&scene);
+    situation.robots[0].at = scene.homes[1] + Vec2::new(3.0, 0.0);
+    situation.robots[1].is_live = false;
+    let mut solver = Solver::new(&scene, &Settings::default(), &situation).unwrap();
+    solver.first(&scene, 0).unwrap();
+    solver.restore().unwrap();
+    let grips = grips_in_turn(solver.plan.tracks());
+    let released: Vec<Vec2> = (grips.iter().filter(|grip| grip.is_release))
+        .map(|grip| grip.place.at)
+        .collect();
+    assert_eq!(released, [scene.objects[0].goal.unwrap()]);
+    let script = Script::of(&scene, &solver.ground, &solver.plan, &situation);
+    let (last, _) = script.robots[0].actions.last().unwrap();
+    let off = scene::vec(last.to) - situation.robots[0].at;
+    assert!(off.norm() <= CONTACT_M, "{last:?}");
 }
