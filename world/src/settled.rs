@@ -58,7 +58,7 @@ pub(crate) struct StuckReason {
     pub(crate) barred: usize,
     /// Objects held by robots that cannot go on.
     pub(crate) held: usize,
-    /// Robots that carry nothing and are not at home.
+    /// Robots that take part, carry nothing and are not at home.
     pub(crate) away: usize,
     /// Robots that are gone.
     pub(crate) gone: usize,
@@ -96,8 +96,9 @@ impl World {
         }
         for (robot, home) in self.robots.iter().zip(&scene.homes) {
             let empty = robot.hand.holding().is_none();
-            reason.away += usize::from(empty && !is_at(robot.position, *home));
-            reason.gone += usize::from(!robot.link.live);
+            let live = robot.link.live;
+            reason.away += usize::from(live && empty && !is_at(robot.position, *home));
+            reason.gone += usize::from(!live);
         }
         Some(reason)
     }
@@ -348,8 +349,10 @@ mod tests {
             bench.settle(0);
             bench.step();
         }
+        bench.world.robots[1].position.x += 0.5;
         let reason = bench.world.stuck_reason(&bench.scene).unwrap();
         assert_eq!((reason.gone, reason.waiting, reason.barred), (1, 1, 1));
+        assert_eq!(reason.away, 0, "it is not to go home");
         assert!(reason.to_string().contains("1 robots are gone"), "{reason}");
     }
 
