@@ -37,6 +37,9 @@ pub enum TellError {
     /// The world says no.
     #[error("{0}")]
     Refused(String),
+    /// It has ended before the world has said anything.
+    #[error("run {0} ended before it could be told")]
+    Over(String),
     /// The world says nothing.
     #[error("the world of run {0} did not answer within {seconds} s", seconds = PATIENCE.as_secs())]
     Silent(String),
@@ -84,7 +87,7 @@ pub fn tell(run: &str, told: &Told) -> Result<Answered, TellError> {
         let waker = topics.wake_world.service(&node, Access::Open)?.waker()?;
         waker.wake()?;
     }
-    while Instant::now() < by && !is_over(&run) {
+    while Instant::now() < by {
         if let Some(reply) = call.answer()? {
             let tick = reply.result().map_err(TellError::Refused)?;
             return Ok(Answered {
@@ -93,6 +96,9 @@ pub fn tell(run: &str, told: &Told) -> Result<Answered, TellError> {
                 objects: run.objects,
                 run: run.name,
             });
+        }
+        if is_over(&run) {
+            return Err(TellError::Over(run.name));
         }
         std::thread::sleep(PERIOD);
     }

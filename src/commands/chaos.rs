@@ -19,7 +19,7 @@ use crate::{output, scenario};
 use plan::Plan;
 use report::Report;
 use set_ups::SetUps;
-use victim::{Ended, Victim};
+use victim::Victim;
 
 /// A run without any sign of life for so long is wedged.
 const WEDGED: Duration = Duration::from_secs(30);
@@ -39,12 +39,11 @@ pub(crate) fn main(args: &ChaosArgs) -> Outcome {
         let victim = Victim::start(args, report.runs, &mut set_ups);
         let mut victim = victim
             .map_err(|error| Failure::system(format!("a run could not be started: {error}")))?;
-        let ended = victim.torment(&mut plan, WEDGED, &interrupt);
-        if ended == Ended::BrokenOff {
+        let Some(ended) = victim.torment(&mut plan, WEDGED, &interrupt) else {
             // What was done to it tells nothing.
             victim.clean_up();
             break;
-        }
+        };
         report.take(victim, ended, &mut plan);
         if output::is_watched() {
             output::complain(&report.progress(&plan));

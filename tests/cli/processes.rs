@@ -170,3 +170,25 @@ fn bench_speed_measures_both_drivers_on_the_same_ticks() {
     let says_when = report["date"].as_str().unwrap();
     assert_eq!(says_when.len(), "2007-04-10T09:30:00Z".len());
 }
+
+#[test]
+fn chaos_that_is_interrupted_says_what_came_of_the_runs_before() {
+    let place = place();
+    let child = Command::new(assert_cmd::cargo::cargo_bin!("rearrange"))
+        .args(["chaos", "e1", "--kills", "100000", "--json"])
+        .env("XDG_RUNTIME_DIR", place.path())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    while live(place.path()).is_empty() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let output = LongRun(Some(child)).interrupt();
+    assert_eq!(output.status.code(), Some(130));
+    let result: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(result["interrupted"], true);
+    assert_eq!(result["failures"], Value::Array(Vec::new()));
+    assert_eq!(result["runs"], result["solved"]);
+    assert_eq!(result["leftovers"], 0);
+    assert!(live(place.path()).is_empty());
+}

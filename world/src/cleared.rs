@@ -130,7 +130,7 @@ impl Cleared {
     pub(crate) fn compare(&mut self, scene: &Scene, bodies: &Bodies, robot: &Robot) -> bool {
         let known = self.terms.are(&Terms::of(bodies, robot));
         let strayed = !known || !self.follow(robot.track.corners());
-        if strayed || !are_identical(self.ahead(), robot.grant.points()) {
+        if strayed || !are_same(self.ahead(), robot.grant.points()) {
             self.find_change(scene, bodies, robot, strayed);
         } else {
             self.has_changed = false;
@@ -205,7 +205,7 @@ impl Cleared {
         let Some((&(_, start), rest)) = track.split_first() else {
             return false;
         };
-        is_identical(start, self.at) && rest.iter().all(|&(_, place)| self.go_to(place))
+        is_same(start, self.at) && rest.iter().all(|&(_, place)| self.go_to(place))
     }
 
     /// Goes on straight to `place`; `false` if the way does not lead there.
@@ -215,11 +215,8 @@ impl Cleared {
         let Some(&corner) = ahead.first() else {
             return false;
         };
-        if is_identical(corner, place) {
-            let passed = ahead
-                .iter()
-                .take_while(|&&c| is_identical(c, place))
-                .count();
+        if is_same(corner, place) {
+            let passed = ahead.iter().take_while(|&&c| is_same(c, place)).count();
             self.corners.copy_within(passed..self.count, 0);
             self.count -= passed;
         } else if !is_between(self.at, corner, place) {
@@ -236,18 +233,11 @@ pub(crate) fn is_same(point: Vec2, other: Vec2) -> bool {
     (point.x == other.x) & (point.y == other.y)
 }
 
-/// Whether two points are the same bit for bit, which takes fewer instructions still.
-#[inline]
-fn is_identical(point: Vec2, other: Vec2) -> bool {
-    let differ = |a: f64, b: f64| a.to_bits() ^ b.to_bits();
-    differ(point.x, other.x) | differ(point.y, other.y) == 0
-}
-
 /// The same of two lists of points.
 #[inline]
-fn are_identical(points: &[Vec2], others: &[Vec2]) -> bool {
+fn are_same(points: &[Vec2], others: &[Vec2]) -> bool {
     let mut pairs = points.iter().zip(others);
-    points.len() == others.len() && pairs.all(|(&a, &b)| is_identical(a, b))
+    points.len() == others.len() && pairs.all(|(&a, &b)| is_same(a, b))
 }
 
 /// Whether `place` is on the straight line from `from` to `to`.

@@ -445,11 +445,13 @@ fn homes(
             return Some(track.start);
         }
         let home = ground.entry(scene, &[alone], home, &[]);
+        if !is_short {
+            return home;
+        }
         let free = track.free.0;
-        let is_open = |home: &u32| !is_short || ground.field(alone, *home).time(free).is_some();
-        let home = home.filter(is_open);
-        track.is_cut_off = is_short && home.is_none();
-        home.or_else(|| track.is_cut_off.then_some(free))
+        let home = home.filter(|&home| ground.field(alone, home).time(free).is_some());
+        track.is_cut_off = home.is_none();
+        Some(home.unwrap_or(free))
     });
     homes.collect()
 }

@@ -114,7 +114,6 @@ impl Report {
     fn judge(&mut self, victim: &Victim, ended: &Ended, result: Option<&Value>) -> Option<String> {
         let status = match ended {
             Ended::Wedged => return Some(format!("wedged; {}", victim.last_words())),
-            Ended::BrokenOff => return Some("broken off".to_owned()),
             Ended::With(status) => status,
         };
         let Some(result) = result else {
