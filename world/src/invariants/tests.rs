@@ -156,6 +156,9 @@ fn grants_that_overlap_are_found() {
 #[test]
 fn a_grant_that_goes_on_into_another_is_found() {
     let mut bench = bench();
+    // Nothing of the other robot changes: the grant alone is to be noticed.
+    let other = &mut bench.world.robots[1];
+    (other.track, other.moved) = (Track::still(other.position), false);
     let at = bench.world.robots[0].position;
     bench.world.robots[0].grant.push(Vec2::new(at.x, 4.0));
     bench.world.robots[0].grant.push(Vec2::new(8.0, 4.0));
