@@ -22,6 +22,7 @@ use shm_types::{
 use crate::anytime::{Anytime, Standing};
 use crate::hard::{Found, HardConstraints};
 use crate::places::Places;
+use crate::rollout::BeginRollout;
 
 /// What one step of the planner is given.
 #[derive(Clone, Copy)]
@@ -183,6 +184,16 @@ impl Planner {
             anytime: None,
             standing: Standing::Written,
             ..Self::new(scene, settings)
+        }
+    }
+
+    /// The same planner, which begins with what runs of the paper's methods come to if that is better
+    /// than its own first plan. Only of methods that plan ahead.
+    #[must_use]
+    pub fn with_rollouts(self, begin: BeginRollout) -> Self {
+        Self {
+            anytime: self.anytime.map(|anytime| anytime.with_rollouts(begin)),
+            ..self
         }
     }
 

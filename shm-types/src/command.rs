@@ -1,5 +1,8 @@
 //! What a robot wants: its whole intent, repeated until the snapshot acknowledges it.
 
+use std::iter::Sum;
+use std::ops::{Add, AddAssign, Sub};
+
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 use crate::capacity::MAX_PATH_POINTS;
@@ -76,6 +79,48 @@ pub struct Counters {
     pub easy_constraints: u64,
     /// Work units spent.
     pub units: u64,
+}
+
+impl Counters {
+    fn with(self, other: Self, of: fn(u64, u64) -> u64) -> Self {
+        Self {
+            polygon_tests: of(self.polygon_tests, other.polygon_tests),
+            path_plans: of(self.path_plans, other.path_plans),
+            cells_expanded: of(self.cells_expanded, other.cells_expanded),
+            selections: of(self.selections, other.selections),
+            easy_constraints: of(self.easy_constraints, other.easy_constraints),
+            units: of(self.units, other.units),
+        }
+    }
+}
+
+impl Add for Counters {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        self.with(other, u64::add)
+    }
+}
+
+impl AddAssign for Counters {
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+/// What was done since.
+impl Sub for Counters {
+    type Output = Self;
+
+    fn sub(self, before: Self) -> Self {
+        self.with(before, u64::sub)
+    }
+}
+
+impl Sum for Counters {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::default(), Self::add)
+    }
 }
 
 /// A robot's whole intent at one tick.

@@ -14,8 +14,10 @@
 
 pub mod faults;
 mod report;
+mod rollout;
 mod simulation;
 mod tables;
 
 pub use report::{RobotReport, SimReport};
+pub use rollout::rollout;
 pub use simulation::{Observer, Participant, Probe, Simulation};

@@ -50,15 +50,8 @@ impl SimReport {
     /// Work done by robots and planner together.
     #[must_use]
     pub fn counters(&self) -> Counters {
-        let robots = self.robots.iter().map(|robot| &robot.counters);
-        robots.fold(self.planner, |sum, one| Counters {
-            polygon_tests: sum.polygon_tests + one.polygon_tests,
-            path_plans: sum.path_plans + one.path_plans,
-            cells_expanded: sum.cells_expanded + one.cells_expanded,
-            selections: sum.selections + one.selections,
-            easy_constraints: sum.easy_constraints + one.easy_constraints,
-            units: sum.units + one.units,
-        })
+        let robots = self.robots.iter().map(|robot| robot.counters);
+        self.planner + robots.sum()
     }
 }
 

@@ -11,13 +11,14 @@ use robot::{Robot, RobotInput};
 use scene::{Change, Scene, Settings};
 use shm_types::capacity::MAX_ROBOTS;
 use shm_types::{
-    Checked, Command, ConstraintTable, ControlKind, ControlRequest, Counts, HardAnswer,
+    Checked, Command, ConstraintTable, ControlKind, ControlRequest, Counters, Counts, HardAnswer,
     HardRequest, Invalid, MotionBatch, Outcome, PlannerReport, RoleKind, Schedule, Validate,
     WorldSnapshot, zeroed,
 };
 use world::{FIRST_INCARNATION, Guard, Next, NotMade, World, WorldInput};
 
 use crate::report::{Cycle, RobotReport, SimReport};
+use crate::rollout::rollout;
 use crate::tables::Tables;
 
 /// Watches a run: called after every tick with the snapshot it led to and the motion that led
@@ -90,21 +91,32 @@ pub struct Simulation<'s> {
     next: Option<Next>,
 }
 
+impl Simulation<'static> {
+    /// As [`Self::new`], with a scene of its own.
+    pub(crate) fn owning(scene: Scene, settings: &Settings, run_id: u64) -> Self {
+        Self::of(Cow::Owned(scene), settings, run_id)
+    }
+}
+
 impl<'s> Simulation<'s> {
     /// A run of all the scene's robots, at tick 0. All memory it will ever use is allocated here.
     #[must_use]
     pub fn new(scene: &'s Scene, settings: &Settings, run_id: u64) -> Self {
+        Self::of(Cow::Borrowed(scene), settings, run_id)
+    }
+
+    fn of(scene: Cow<'s, Scene>, settings: &Settings, run_id: u64) -> Self {
         let robots = scene.homes.len();
-        let world = World::new(scene, settings.clone(), run_id);
+        let world = World::new(&scene, settings.clone(), run_id);
         let mut snapshot = zeroed();
         world.snapshot_into(&mut snapshot);
         Self {
-            scene: Cow::Borrowed(scene),
             world,
-            planner: Planner::new(scene, settings.clone()),
+            planner: Planner::new(&scene, settings.clone()).with_rollouts(rollout),
             robots: (0..robots)
-                .map(|id| Robot::new(scene, settings.clone(), id, FIRST_INCARNATION))
+                .map(|id| Robot::new(&scene, settings.clone(), id, FIRST_INCARNATION))
                 .collect(),
+            scene,
             snapshot,
             motion: zeroed(),
             commands: vec![Command::default(); robots],
@@ -152,6 +164,12 @@ impl<'s> Simulation<'s> {
         &self.motion
     }
 
+    /// Work done by robots and planner so far.
+    pub(crate) fn work(&self) -> Counters {
+        let robots = self.commands.iter().map(|command| command.counters);
+        self.report.counters + robots.sum()
+    }
+
     /// How the run stands.
     #[must_use]
     pub fn outcome(&self) -> Outcome {
@@ -196,7 +214,8 @@ impl<'s> Simulation<'s> {
             self.settings.clone(),
             self.report.incarnation,
             published.map(Checked::get),
-        );
+        )
+        .with_rollouts(rollout);
     }
 
     /// Changes the scene, all of `changes` together: the tick whose snapshot is the first to show

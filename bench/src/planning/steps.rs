@@ -330,8 +330,7 @@ impl<'a> Workbench<'a> {
                 search.begin(scene, object.start + object.grasp, goal + object.grasp);
                 finish(|budget, counters| search.advance(scene, budget, counters).is_ready())
             });
-            counters.cells_expanded += one.cells_expanded;
-            counters.units += one.units;
+            counters += one;
             time_s += one_s;
         }
         Sample {

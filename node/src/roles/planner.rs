@@ -117,6 +117,7 @@ impl Shell {
                 seat.incarnation,
                 self.last.read(seat.counts()).as_deref(),
             )
+            .with_rollouts(sim::rollout)
         });
         Ok(())
     }

@@ -19,6 +19,7 @@ mod distances;
 mod greedy;
 mod ground;
 mod improve;
+mod incumbent;
 mod joint;
 mod keep;
 mod known;
@@ -39,11 +40,13 @@ use scene::{Budget, Scene, Settings};
 use shm_types::{Checked, Counters, RobotSchedule, RobotState, Schedule, Verdict, WorldSnapshot};
 
 use crate::anytime::anew::DOUBT_NS;
+use crate::anytime::incumbent::Rollouts;
 use crate::anytime::publish::Script;
 use crate::anytime::rounds::{ROUND_S, patience_s};
 use crate::anytime::situation::Situation;
 use crate::anytime::solver::Solver;
 use crate::proof::Proof;
+use crate::rollout::BeginRollout;
 
 /// A plan of the fewest steps is looked for until this much is spent before anybody moves, s.
 const MOST_BEFORE_MOTION_S: f64 = 1.0;
@@ -81,6 +84,10 @@ enum Stage {
     Search,
     /// A shortest one, of a small room in which everything takes as long.
     Shorten,
+    /// Plans out of what the paper's methods come to.
+    Rollout,
+    /// Better ones, if these come to more: until that many units are spent in all.
+    CatchUp(u64),
     /// Writing it down.
     Write,
     /// Robots follow it; better ones are looked for in rounds, until that many units are spent in
@@ -119,10 +126,11 @@ pub(crate) struct Anytime {
     stage: Stage,
     /// Units done and not paid for.
     debt: u64,
-    /// Units done in all.
-    spent: u64,
+    /// What was done in all since planning began.
+    done: Counters,
     /// What looking for a proof that there is no plan has taken.
     proving: Counters,
+    rollouts: Rollouts,
     /// The plan as it is published, once it is.
     script: Option<Script>,
     /// The one before, until the new one is in force.
@@ -133,9 +141,6 @@ pub(crate) struct Anytime {
     quiet: (u64, u64),
     /// For how long that may go on, ns.
     doubt_ns: u64,
-    /// Cells expanded and ways looked for in all.
-    cells: u64,
-    ways: u64,
 }
 
 impl Anytime {
@@ -149,15 +154,22 @@ impl Anytime {
             verdict: Verdict::Open,
             stage: Stage::New,
             debt: 0,
-            spent: 0,
+            done: Counters::default(),
             proving: Counters::default(),
+            rollouts: Rollouts::new(None),
             script: None,
             replaced: None,
             begun_ns: None,
             quiet: (0, 0),
             doubt_ns: DOUBT_NS,
-            cells: 0,
-            ways: 0,
+        }
+    }
+
+    /// The same, which begins with what the paper's methods come to if that is better.
+    pub(crate) fn with_rollouts(self, begin: BeginRollout) -> Self {
+        Self {
+            rollouts: Rollouts::new(Some(begin)),
+            ..self
         }
     }
 
@@ -240,9 +252,10 @@ impl Anytime {
                     && self.situation.is_beside(scene);
                 let situation = &self.situation;
                 self.solver = Solver::new(scene, &self.settings, situation).map(Box::new);
-                (self.spent, self.cells, self.ways) = (0, 0, 0);
+                self.done = Counters::default();
                 self.verdict = Verdict::Open;
                 self.proving = Counters::default();
+                self.rollouts.reset();
                 self.stage = Stage::First(0);
                 return false;
             }
@@ -253,14 +266,12 @@ impl Anytime {
             return false;
         };
         let is_written = self.work_with(&mut solver, scene, snapshot, out);
-        let cells = solver.cells() + self.proving.cells_expanded;
-        let ways = solver.ways() + self.proving.path_plans;
-        counters.cells_expanded += cells - self.cells;
-        counters.path_plans += ways - self.ways;
-        (self.cells, self.ways) = (cells, ways);
-        let spent = solver.units() + self.proving.cells_expanded;
-        self.debt += spent - self.spent;
-        self.spent = spent;
+        let done = solver.work() + self.proving + self.rollouts.work();
+        let new = done - self.done;
+        self.debt += new.units;
+        // These are counted as they are paid for.
+        *counters += Counters { units: 0, ..new };
+        self.done = done;
         self.solver = Some(solver);
         is_written
     }
@@ -282,7 +293,10 @@ impl Anytime {
             },
             Stage::Prove => {
                 let (proof, work) = Proof::search(scene);
-                self.proving = work;
+                self.proving = Counters {
+                    units: work.cells_expanded,
+                    ..work
+                };
                 match proof {
                     Some(_) => Stage::Done(Verdict::Proved),
                     None => Stage::First(ATTEMPTS_BEFORE_PROOF),
@@ -299,7 +313,22 @@ impl Anytime {
             {
                 Stage::Shorten
             }
-            Stage::Shorten => Stage::Write,
+            Stage::Shorten | Stage::Rollout
+                if self.rollouts.advance(scene, &self.settings, solver) =>
+            {
+                Stage::Rollout
+            }
+            Stage::Shorten | Stage::Rollout => {
+                Stage::CatchUp(solver.units() + units(self.rollouts.catching_up_s()))
+            }
+            Stage::CatchUp(until)
+                if solver.units() < until
+                    && self.rollouts.lags(solver)
+                    && solver.improve(scene) =>
+            {
+                Stage::CatchUp(until)
+            }
+            Stage::CatchUp(_) => Stage::Write,
             Stage::Write => match solver.restore() {
                 None => Stage::Done(Verdict::NotFound),
                 Some(makespan) => {

@@ -34,6 +34,8 @@ pub(crate) struct Plan {
     tracks: Vec<Track>,
     rests: Vec<Rest>,
     way: Vec<Piece>,
+    /// Whether robots that would hold an object for long grasp it later, if they are done as soon.
+    pub(crate) grasps_late: bool,
 }
 
 impl Plan {
@@ -45,6 +47,7 @@ impl Plan {
             tracks: Vec::new(),
             rests: Vec::new(),
             way: Vec::new(),
+            grasps_late: false,
         }
     }
 
@@ -144,7 +147,7 @@ impl Plan {
             found = router.find(ground, &self.timeline, &quest, &mut way);
         }
         let done = found.map(|end| {
-            if router.is_hasty {
+            if self.grasps_late {
                 self.grasp_late(ground, router, wanted, &mut legs, end, &mut way);
             }
             self.enter_way(ground, wanted.robot, &way, Some(wanted))

@@ -18,6 +18,7 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use scene::{ROBOT_ALONE, Scene, Settings};
+use shm_types::Counters;
 
 use crate::anytime::cuts::Cuts;
 use crate::anytime::greedy::Offers;
@@ -35,6 +36,7 @@ use crate::anytime::tried::Tried;
 use crate::anytime::{
     UNITS_PER_CONFIGURATION, UNITS_PER_INTERVAL, UNITS_PER_PIECE, UNITS_PER_SMALL_CONFIGURATION,
 };
+use crate::rollout::Transfer;
 
 /// Most distances that are kept: one for each lattice point and place that somebody goes to, 4
 /// bytes each.
@@ -53,7 +55,7 @@ pub(super) struct Best {
 }
 
 /// How moves are committed.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Mode {
     /// Strictly in the order of the sequence.
     in_turn: bool,
@@ -64,6 +66,8 @@ struct Mode {
     /// Robots go home before the first move is made, where they can: what is put down may leave them
     /// no way. Who gets a move does not go.
     home_first: bool,
+    /// A robot that has more to do does not go home before that.
+    goes_on: bool,
 }
 
 const PLAIN: Mode = Mode {
@@ -71,6 +75,7 @@ const PLAIN: Mode = Mode {
     makes_room: false,
     leaves_away: false,
     home_first: false,
+    goes_on: false,
 };
 const PATIENT: Mode = Mode {
     in_turn: true,
@@ -99,6 +104,21 @@ const MODES: [Mode; 6] = [
         home_first: true,
         ..PATIENT
     },
+];
+
+/// The ways to plan an order that robots carried out in a run. Who had more to do there went on to
+/// it, so that nobody made way for robots that go home.
+const MODES_OF_RUNS: [Mode; 4] = [
+    Mode {
+        goes_on: true,
+        ..PLAIN
+    },
+    Mode {
+        goes_on: true,
+        ..PATIENT
+    },
+    PLAIN,
+    PATIENT,
 ];
 
 /// Makes plans for one scene.
@@ -201,14 +221,14 @@ impl Solver {
         })
     }
 
-    /// Cells expanded so far.
-    pub(crate) fn cells(&self) -> u64 {
-        self.router.expanded + self.ground.flooded() + self.sequencer.cells
-    }
-
-    /// Ways looked for so far.
-    pub(crate) fn ways(&self) -> u64 {
-        self.router.searches + self.sequencer.floods
+    /// What was done so far.
+    pub(crate) fn work(&self) -> Counters {
+        Counters {
+            path_plans: self.router.searches + self.sequencer.floods,
+            cells_expanded: self.router.expanded + self.ground.flooded() + self.sequencer.cells,
+            units: self.units(),
+            ..Counters::default()
+        }
     }
 
     /// Work done so far, units.
@@ -270,6 +290,7 @@ impl Solver {
         let is_away = |(track, home): (&Track, &u32)| !track.is_gone && track.free.0 != *home;
         let is_any_away = self.start.robots.iter().zip(&self.homes).any(is_away);
         self.router.is_hasty = true;
+        self.plan.grasps_late = true;
         for mode in MODES {
             if mode.home_first && !is_any_away {
                 break;
@@ -282,11 +303,68 @@ impl Solver {
             }
         }
         self.router.is_hasty = false;
+        self.plan.grasps_late = false;
         self.known.clear();
         let (makespan, order) = found?;
         self.current = Some((Rc::new(hops), order));
         let source = self.current.clone();
         Some(self.keep(makespan, source))
+    }
+
+    /// Plans for these transfers, in turn; keeps what is better than the best plan. One that takes
+    /// no longer than `enough_s` is good enough.
+    pub(super) fn follow(
+        &mut self,
+        scene: &Scene,
+        transfers: &[Transfer],
+        enough_s: f64,
+    ) -> Option<()> {
+        let step = |made: &Transfer| {
+            let goal = self.goals[made.object as usize].as_ref()?;
+            Some((made.object as usize, goal.held(made.grasp)))
+        };
+        let sequence: Vec<Step> = transfers.iter().map(step).collect::<Option<_>>()?;
+        let (ground, start, homes) = (&mut self.ground, &self.start, &self.homes);
+        let hops = Rc::new(Hops::new(scene, ground, start, homes, &sequence)?);
+        let items = transfers.iter().map(|made| (made.object, made.robot));
+        let order: Vec<Item> = items.collect();
+        let mut of_best = self.mode;
+        self.plan.grasps_late = true;
+        for mode in MODES_OF_RUNS {
+            let best = self.best.as_ref().map_or(EVER, |best| best.makespan);
+            self.mode = mode;
+            self.known.clear();
+            if let Some(makespan) = self.decode(scene, &hops, &order, best) {
+                of_best = mode;
+                self.current = Some((Rc::clone(&hops), order.clone()));
+                let source = self.current.clone();
+                self.keep(makespan, source);
+            }
+            if self.best_s().is_some_and(|best_s| best_s <= enough_s) {
+                break;
+            }
+        }
+        self.plan.grasps_late = false;
+        self.mode = of_best;
+        self.known.clear();
+        Some(())
+    }
+
+    /// Whether the plan takes so many times as long as its moves with the walls alone, or moves
+    /// something twice.
+    pub(super) fn is_roundabout(&self, times: f64) -> bool {
+        let (Some(best), Some((hops, order))) = (&self.best, &self.current) else {
+            return true;
+        };
+        let least = hops.least(order).unwrap_or(0);
+        let is_set_aside = hops.of.iter().any(|(first, end)| first + 1 < *end);
+        is_set_aside || f64::from(best.makespan) > f64::from(least) * times
+    }
+
+    /// How long the best plan takes, s.
+    pub(super) fn best_s(&self) -> Option<f64> {
+        let best = self.best.as_ref()?;
+        Some(self.ground.seconds(best.makespan))
     }
 
     /// Keeps the plan as the best one.
@@ -404,7 +482,11 @@ impl Solver {
     /// Where a robot is to be after a move of an order: at home, unless it is not the last one and
     /// the robot is known to have no way home yet.
     fn ends(&self, hops: &Hops, order: &[Item], place: usize) -> Ends {
-        let is_last = place + 1 == order.len();
+        let (robot, later) = (order[place].1, &order[place + 1..]);
+        if self.mode.goes_on && later.iter().any(|item| item.1 == robot) {
+            return Ends::Anywhere;
+        }
+        let is_last = later.is_empty();
         if !is_last && self.cuts.shut_in(hops, &order[..place], order[place]) {
             Ends::Anywhere
         } else {

@@ -28,6 +28,7 @@ use super::fault::{Channel, Fault, Kind, Whom};
 use super::office::Office;
 use super::station::{Life, Shot, Station};
 use super::watch::Watch;
+use crate::rollout::rollout;
 
 /// How often the supervisor tells the world of a process again that it does not know, ticks.
 const TELL_AGAIN_TICKS: u64 = 20;
@@ -94,7 +95,7 @@ impl<'s> Disturbed<'s> {
         let seed = plan.first().map_or(0, |fault| fault.tick);
         Self {
             stations: (0..scene.homes.len()).map(station).collect(),
-            office: Office::new(Planner::new(scene, settings.clone())),
+            office: Office::new(Planner::new(scene, settings.clone()).with_rollouts(rollout)),
             faults: Active::new(plan, until),
             rng: ChaCha8Rng::seed_from_u64(seed),
             watch: Watch::new(&snapshot),
@@ -219,7 +220,8 @@ impl<'s> Disturbed<'s> {
                 self.settings.clone(),
                 self.office.incarnation,
                 self.office.published.as_ref().map(|schedule| &***schedule),
-            );
+            )
+            .with_rollouts(rollout);
             self.office.planner = Some(Box::new(planner));
         }
         for id in 0..self.stations.len() {

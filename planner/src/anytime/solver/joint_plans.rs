@@ -102,4 +102,9 @@ impl Solver {
         }
         false
     }
+
+    /// Whether the room is one of those that a plan of the fewest steps is looked for.
+    pub(crate) const fn is_small(&self) -> bool {
+        self.small_configurations > 0
+    }
 }

@@ -401,13 +401,13 @@ fn what_is_looked_for_is_counted_and_charged() {
     let scene = cells(&["A.a.1"]);
     let mut solver = solver_of(&scene);
     solver.first(&scene, 0).unwrap();
-    assert_eq!(solver.ways(), 3 + 1);
+    assert_eq!(solver.work().path_plans, 3 + 1);
     let expanded = solver.router.expanded;
     // Eight steps and two grips at least.
     assert!(expanded >= 10, "{expanded}");
     assert!(solver.units() >= UNITS_PER_INTERVAL * expanded + solver.sequencer.cells);
     // A cell takes a unit at least.
-    assert!((expanded..=solver.units()).contains(&solver.cells()));
+    assert!((expanded..=solver.units()).contains(&solver.work().cells_expanded));
 }
 
 #[test]
