@@ -1,7 +1,5 @@
 //! What the default method owes to runs of the paper's methods that it carries out beforehand.
 
-#![expect(clippy::unwrap_used, reason = "tests")]
-
 use planner::Planner;
 use scene::{GenerateOptions, Method, Scene, Settings};
 use shm_types::Outcome;
@@ -29,7 +27,6 @@ fn rooms() -> impl Iterator<Item = (u64, Scene)> {
             walls,
             crowding,
             extra_moves: 2,
-            ..GenerateOptions::default()
         };
         Some((seed, scene::generate(&options).ok()?.scene))
     })
