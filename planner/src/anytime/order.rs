@@ -211,6 +211,28 @@ impl Hops {
         Some(ends.max().unwrap_or(0))
     }
 
+    /// The least time that this order takes or one that is found from it by so many changes, with the
+    /// walls alone.
+    pub(crate) fn least_nearby(
+        &self,
+        order: &[Item],
+        changes: usize,
+        random: &mut ChaCha8Rng,
+    ) -> Time {
+        let mut best = order.to_vec();
+        let mut known = self.least(order).unwrap_or(EVER);
+        for attempt in 0..changes {
+            let mut near = best.clone();
+            for _ in 0..=attempt % 3 {
+                change(&mut near, self.robots(), random);
+            }
+            if let Some(least) = self.least(&near).filter(|least| *least <= known) {
+                (best, known) = (near, least);
+            }
+        }
+        known
+    }
+
     /// By move of an order: when its robot has to be home again, if that is its last one; else when
     /// it would have to be, so that all is done before `limit`.
     pub(crate) fn home_by(&self, order: &[Item], limit: Time) -> Vec<Time> {
@@ -457,5 +479,32 @@ pub(crate) fn change(order: &mut Vec<Item>, robots: usize, random: &mut ChaCha8R
             item.1 = random.random_range(0..robots) as u32;
             order.insert(random.random_range(0..count), item);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+
+    use super::*;
+    use crate::anytime::solver::testing::planned;
+
+    #[test]
+    fn an_order_in_which_one_robot_does_everything_is_far_from_the_least_nearby() {
+        let (_, solver, _) = planned(&scene::GenerateOptions {
+            robots: 4,
+            area_m2: 60.0,
+            crowding: 0.2,
+            ..scene::GenerateOptions::default()
+        });
+        let (hops, order) = solver.current.clone().unwrap();
+        let by_one: Vec<Item> = order.iter().map(|&(object, _)| (object, 0)).collect();
+        let random = || ChaCha8Rng::seed_from_u64(1);
+        let alone = hops.least(&by_one).unwrap();
+        assert_eq!(hops.least_nearby(&by_one, 0, &mut random()), alone);
+        let nearby = hops.least_nearby(&by_one, 400, &mut random());
+        assert!(nearby < alone * 3 / 4, "{nearby} and {alone}");
+        // No order is found that the moves do not allow.
+        assert!(nearby >= *hops.transfer.iter().max().unwrap());
     }
 }

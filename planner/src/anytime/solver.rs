@@ -42,6 +42,9 @@ use crate::rollout::Transfer;
 /// bytes each.
 const MOST_DISTANCES: usize = 1 << 28;
 
+/// Orders looked at to know a good one.
+const ORDERS_LOOKED_AT: usize = 400;
+
 /// Moves, and an order of them.
 pub(super) type Source = (Rc<Hops>, Vec<Item>);
 
@@ -350,13 +353,15 @@ impl Solver {
         Some(())
     }
 
-    /// Whether the plan takes so many times as long as its moves with the walls alone, or moves
-    /// something twice.
-    pub(super) fn is_roundabout(&self, times: f64) -> bool {
+    /// Whether the plan takes so many times as long as its moves with the walls alone, in a good
+    /// order, or moves something twice.
+    pub(super) fn is_roundabout(&mut self, times: f64) -> bool {
         let (Some(best), Some((hops, order))) = (&self.best, &self.current) else {
             return true;
         };
-        let least = hops.least(order).unwrap_or(0);
+        // What is tried later does not depend on having asked.
+        let least = hops.least_nearby(order, ORDERS_LOOKED_AT, &mut self.random.clone());
+        self.weighing += ORDERS_LOOKED_AT as u64 * hops.list.len() as u64;
         let is_set_aside = hops.of.iter().any(|(first, end)| first + 1 < *end);
         is_set_aside || f64::from(best.makespan) > f64::from(least) * times
     }
