@@ -101,6 +101,7 @@ impl Anytime {
         self.script = None;
         self.replaced = None;
         self.solver = None;
+        self.rollouts.reset();
         self.begun_ns = None;
         self.stage = Stage::Settle(u64::MAX, 0);
     }

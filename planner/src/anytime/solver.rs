@@ -58,7 +58,7 @@ pub(super) struct Best {
 }
 
 /// How moves are committed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 struct Mode {
     /// Strictly in the order of the sequence.
     in_turn: bool,
@@ -314,30 +314,22 @@ impl Solver {
         Some(self.keep(makespan, source))
     }
 
-    /// Plans for these transfers, in turn; keeps what is better than the best plan. One that takes
+    /// Plans for these transfers, in turn, and keeps what is better than the best plan. One that takes
     /// no longer than `enough_s` is good enough.
-    pub(super) fn follow(
-        &mut self,
-        scene: &Scene,
-        transfers: &[Transfer],
-        enough_s: f64,
-    ) -> Option<()> {
-        let step = |made: &Transfer| {
-            let goal = self.goals[made.object as usize].as_ref()?;
-            Some((made.object as usize, goal.held(made.grasp)))
+    pub(super) fn follow(&mut self, scene: &Scene, transfers: &[Transfer], enough_s: f64) {
+        let Some((hops, order)) = self.order_of(scene, transfers) else {
+            return;
         };
-        let sequence: Vec<Step> = transfers.iter().map(step).collect::<Option<_>>()?;
-        let (ground, start, homes) = (&mut self.ground, &self.start, &self.homes);
-        let hops = Rc::new(Hops::new(scene, ground, start, homes, &sequence)?);
-        let items = transfers.iter().map(|made| (made.object, made.robot));
-        let order: Vec<Item> = items.collect();
+        // What fails in one mode may do in another.
+        let tried = std::mem::take(&mut self.tried);
         let mut of_best = self.mode;
         self.plan.grasps_late = true;
         for mode in MODES_OF_RUNS {
-            let best = self.best.as_ref().map_or(EVER, |best| best.makespan);
             self.mode = mode;
             self.known.clear();
-            if let Some(makespan) = self.decode(scene, &hops, &order, best) {
+            let best = self.best.as_ref().map_or(EVER, |best| best.makespan);
+            let found = self.decode(scene, &hops, &order, best);
+            if let Some(makespan) = found.filter(|makespan| *makespan < best) {
                 of_best = mode;
                 self.current = Some((Rc::clone(&hops), order.clone()));
                 let source = self.current.clone();
@@ -350,7 +342,23 @@ impl Solver {
         self.plan.grasps_late = false;
         self.mode = of_best;
         self.known.clear();
-        Some(())
+        self.tried = tried;
+    }
+
+    /// The moves of these transfers, and their order; none if that is not one in which they can be
+    /// made.
+    fn order_of(&mut self, scene: &Scene, transfers: &[Transfer]) -> Option<Source> {
+        let step = |made: &Transfer| {
+            let goal = self.goals[made.object as usize].as_ref()?;
+            Some((made.object as usize, goal.held(made.grasp)))
+        };
+        let sequence: Vec<Step> = transfers.iter().map(step).collect::<Option<_>>()?;
+        let (ground, start, homes) = (&mut self.ground, &self.start, &self.homes);
+        let hops = Hops::new(scene, ground, start, homes, &sequence)?;
+        let items = transfers.iter().map(|made| (made.object, made.robot));
+        let order: Vec<Item> = items.collect();
+        hops.least(&order)?;
+        Some((Rc::new(hops), order))
     }
 
     /// Whether the plan takes so many times as long as its moves with the walls alone, in a good
