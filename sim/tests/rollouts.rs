@@ -1,5 +1,7 @@
 //! What the default method owes to runs of the paper's methods that it carries out beforehand.
 
+#![expect(clippy::unwrap_used, reason = "tests")]
+
 use planner::Planner;
 use scene::{GenerateOptions, Method, Scene, Settings};
 use shm_types::Outcome;
