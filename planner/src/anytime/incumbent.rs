@@ -46,7 +46,7 @@ pub(super) struct Rollouts {
     found: Vec<Vec<Transfer>>,
     /// The least world time that one of these took, s.
     least_s: f64,
-    /// Whether one of these comes to what the planner's own plan does.
+    /// Whether the first of these came to what the planner's own plan does.
     is_matched: bool,
 }
 
@@ -179,7 +179,7 @@ mod tests {
 
     use super::*;
     use crate::anytime::situation::Situation;
-    use crate::anytime::solver::testing::planned;
+    use crate::anytime::solver::testing::{cells, planned, solver_of};
 
     /// A run that is solved after so many ticks, if ever, at so many units a tick.
     #[derive(Clone, Default)]
@@ -311,6 +311,20 @@ mod tests {
             grasp: 0,
         };
         once.then(|| order.iter().map(made).collect())
+    }
+
+    /// Robots that are parked in the way go home again at no limit.
+    #[test]
+    fn a_plan_that_is_no_better_is_not_kept_though_its_moves_are_made_in_time() {
+        let scene = cells(&["1.AB.a", "##.###"]);
+        let mut solver = solver_of(&scene);
+        solver.first(&scene, 0).unwrap();
+        let made = transfers(&solver).unwrap();
+        let best = &mut solver.best.as_mut().unwrap().makespan;
+        *best -= 1;
+        let best = *best;
+        solver.follow(&scene, &made, 0.0);
+        assert_eq!(solver.best.unwrap().makespan, best);
     }
 
     #[test]

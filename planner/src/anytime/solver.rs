@@ -464,7 +464,8 @@ impl Solver {
         done.is_some()
     }
 
-    /// Carries an order out in the plan; how long it takes, if that is less than `limit`.
+    /// Carries an order out in the plan; how long it takes, if all its moves are made in time for less
+    /// than `limit`. Who is parked in the way and has to go elsewhere may be home later than that.
     pub(super) fn decode(
         &mut self,
         scene: &Scene,
