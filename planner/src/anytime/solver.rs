@@ -2,10 +2,11 @@
 //!
 //! Responsible for: first plans, carrying out an order, which plan is the best so far.
 //! Not responsible for: what is tried to make it better (`improve`), while robots follow it
-//! (`under_way`), plans out of joint configurations (`joint_plans`), committing (`plan`), what is
-//! published (`publish`).
+//! (`under_way`), plans out of joint configurations (`joint_plans`) or of runs of other methods
+//! (`runs`), committing (`plan`), what is published (`publish`).
 
 mod joint_plans;
+mod runs;
 #[cfg(test)]
 pub(super) mod testing;
 #[cfg(test)]
@@ -36,14 +37,10 @@ use crate::anytime::tried::Tried;
 use crate::anytime::{
     UNITS_PER_CONFIGURATION, UNITS_PER_INTERVAL, UNITS_PER_PIECE, UNITS_PER_SMALL_CONFIGURATION,
 };
-use crate::rollout::Transfer;
 
 /// Most distances that are kept: one for each lattice point and place that somebody goes to, 4
 /// bytes each.
 const MOST_DISTANCES: usize = 1 << 28;
-
-/// Orders looked at to know a good one.
-const ORDERS_LOOKED_AT: usize = 400;
 
 /// Moves, and an order of them.
 pub(super) type Source = (Rc<Hops>, Vec<Item>);
@@ -107,21 +104,6 @@ const MODES: [Mode; 6] = [
         home_first: true,
         ..PATIENT
     },
-];
-
-/// The ways to plan an order that robots carried out in a run. Who had more to do there went on to
-/// it, so that nobody made way for robots that go home.
-const MODES_OF_RUNS: [Mode; 4] = [
-    Mode {
-        goes_on: true,
-        ..PLAIN
-    },
-    Mode {
-        goes_on: true,
-        ..PATIENT
-    },
-    PLAIN,
-    PATIENT,
 ];
 
 /// Makes plans for one scene.
@@ -312,66 +294,6 @@ impl Solver {
         self.current = Some((Rc::new(hops), order));
         let source = self.current.clone();
         Some(self.keep(makespan, source))
-    }
-
-    /// Plans for these transfers, in turn, and keeps what is better than the best plan. One that takes
-    /// no longer than `enough_s` is good enough.
-    pub(super) fn follow(&mut self, scene: &Scene, transfers: &[Transfer], enough_s: f64) {
-        let Some((hops, order)) = self.order_of(scene, transfers) else {
-            return;
-        };
-        // What fails in one mode may do in another.
-        let tried = std::mem::take(&mut self.tried);
-        let mut of_best = self.mode;
-        self.plan.grasps_late = true;
-        for mode in MODES_OF_RUNS {
-            self.mode = mode;
-            self.known.clear();
-            let best = self.best.as_ref().map_or(EVER, |best| best.makespan);
-            let found = self.decode(scene, &hops, &order, best);
-            if let Some(makespan) = found.filter(|makespan| *makespan < best) {
-                of_best = mode;
-                self.current = Some((Rc::clone(&hops), order.clone()));
-                let source = self.current.clone();
-                self.keep(makespan, source);
-            }
-            if self.best_s().is_some_and(|best_s| best_s <= enough_s) {
-                break;
-            }
-        }
-        self.plan.grasps_late = false;
-        self.mode = of_best;
-        self.known.clear();
-        self.tried = tried;
-    }
-
-    /// The moves of these transfers, and their order; none if that is not one in which they can be
-    /// made.
-    fn order_of(&mut self, scene: &Scene, transfers: &[Transfer]) -> Option<Source> {
-        let step = |made: &Transfer| {
-            let goal = self.goals[made.object as usize].as_ref()?;
-            Some((made.object as usize, goal.held(made.grasp)))
-        };
-        let sequence: Vec<Step> = transfers.iter().map(step).collect::<Option<_>>()?;
-        let (ground, start, homes) = (&mut self.ground, &self.start, &self.homes);
-        let hops = Hops::new(scene, ground, start, homes, &sequence)?;
-        let items = transfers.iter().map(|made| (made.object, made.robot));
-        let order: Vec<Item> = items.collect();
-        hops.least(&order)?;
-        Some((Rc::new(hops), order))
-    }
-
-    /// Whether the plan takes so many times as long as its moves with the walls alone, in a good
-    /// order, or moves something twice.
-    pub(super) fn is_roundabout(&mut self, times: f64) -> bool {
-        let (Some(best), Some((hops, order))) = (&self.best, &self.current) else {
-            return true;
-        };
-        // What is tried later does not depend on having asked.
-        let least = hops.least_nearby(order, ORDERS_LOOKED_AT, &mut self.random.clone());
-        self.weighing += ORDERS_LOOKED_AT as u64 * hops.list.len() as u64;
-        let is_set_aside = hops.of.iter().any(|(first, end)| first + 1 < *end);
-        is_set_aside || f64::from(best.makespan) > f64::from(least) * times
     }
 
     /// How long the best plan takes, s.
